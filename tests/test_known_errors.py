@@ -27,7 +27,7 @@ from shoal.mechanics.analysis.equilibrium import Equilibrium
 from shoal.pictures import columns, titles
 from shoal.pictures.estimates import grade
 from shoal.pictures.gaps import gaps
-from shoal.pictures.inline import plot
+from shoal.pictures.inline import html, plot
 from shoal.pictures.response import response
 from shoal.pictures.rest import rest
 from shoal.pictures.simulation import simulation
@@ -163,6 +163,8 @@ WAYS: dict[str, Callable[[Answers], float]] = {
     "simulate, status line": lambda of: first(printed(lambda: tables.trajectory_table(of.motion, SCENE))),
     "simulate, JSON": lambda of: float(of.motion.to_json()["error"]),
     "simulate, page": lambda of: first(lead(simulation(of.motion, SCENE))),
+    "simulate, notebook": lambda of: first(html(of.motion)),
+    "simulate, chart": lambda of: first(title(plot(of.motion).figure)),
     "simulate, Parquet and NetCDF": lambda of: float(columns.about_motion(of.motion, SCENE)["error_m"]),
     "simulate, flow": lambda of: first(pages.of_motion(of.motion)),
     "simulate, MLflow": lambda of: tracked(lambda: engines.log_forward(SCENE, of.motion, {})),

@@ -54,7 +54,6 @@ def log_forward(scene: Scene, motion: Trajectory, album: Mapping[str, bytes]) ->
     with open_run("Forward", name, description=scene.description, tags=tags) as run:
         run.judge(*verdict(motion))
         log_motion_of(run, scene, motion)
-        log_errors(run, motion.errors)
         for file, content in album.items():
             run.picture(content, file)
         return run.run_id
@@ -87,6 +86,7 @@ def log_motion_of(run: Run, scene: Scene, motion: Trajectory, selection: Selecti
     made = {f"model.{name}": value for name, value in kept}
     run.params({**stated(scene), "engine": motion.engine, **made})
     run.text(as_yaml(scene.model_dump(mode="json")), "scene.yaml")
+    log_errors(run, motion.errors)
     run.metric("final/energy_drift", float(motion.energy_drift[0]))
     run.metric("final/constraint_drift", float(motion.constraint_drift[0]))
     run.metric("final/steps", motion.steps)

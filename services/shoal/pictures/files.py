@@ -59,7 +59,7 @@ def trajectory(motion: Trajectory, scene: Scene, path: Path, selection: Selectio
         from shoal.pictures.titles import ends, rejected
 
         moving = moved(motion, scene)
-        title = ends(scene.name, moving) if motion.ok else rejected(scene.name, motion)
+        title = ends(scene.name, moving, motion.errors) if motion.ok else rejected(scene.name, motion)
         return gif(moving, title) if moves else png(poses(moving, title))
 
     def kept() -> bytes:

@@ -117,7 +117,7 @@ def _(scene: Scene) -> str:
 @html.register
 def _(trajectory: Trajectory) -> str:
     """Where the markers end, and whether that can be trusted; of several lanes the first."""
-    end, trust = float(trajectory.times[-1]), f"status {trajectory.status[0]}"
+    end, trust = float(trajectory.times[-1]), f"status {trajectory.status[0]}, {trajectory.errors.brief}"
     several = f"the first of {trajectory.lanes} lanes, " if trajectory.lanes > 1 else ""
     message = f" ({trajectory.message})" if trajectory.message else ""
     ends = [[name, *(f"{x:.6f}" for x in trajectory.marker(name)[-1])] for name in trajectory.markers]
@@ -152,4 +152,4 @@ def _paths(trajectory: Trajectory) -> Figure:
     markers = {name: trajectory.marker(name) for name in trajectory.markers}
     moving = Motion("", trajectory.times, np.empty((0, len(trajectory.axes))), {}, markers)
     name = trajectory.engine
-    return paths(moving, reaches(name, moving) if trajectory.ok else rejected(name, trajectory))
+    return paths(moving, reaches(name, moving, trajectory.errors) if trajectory.ok else rejected(name, trajectory))

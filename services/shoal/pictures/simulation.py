@@ -103,7 +103,9 @@ def _poses(trajectory: Trajectory, scene: Scene, moving: Motion) -> Drawn:
     colour = "red-orange " if moving.up is not None else ""
     return Drawn(
         "poses",
-        poses(moving, ends(scene.name, moving) if trajectory.ok else rejected(scene.name, trajectory)),
+        poses(
+            moving, ends(scene.name, moving, trajectory.errors) if trajectory.ok else rejected(scene.name, trajectory)
+        ),
         alt if moving.up is None else f"From the front, above, right and a corner: {alt}",
         f"The later, the darker; the thin {colour}lines are the paths of the markers.",
     )
@@ -113,7 +115,7 @@ def _paths(trajectory: Trajectory, scene: Scene, moving: Motion) -> Drawn:
     reach = {name: float(np.max(np.ptp(path, axis=0))) for name, path in moving.markers.items()}
     moves = ", ".join(f"{name} moves within {length(size)}" for name, size in reach.items())
     words = moves if trajectory.ok else "not to be trusted"
-    title = reaches(scene.name, moving) if trajectory.ok else rejected(scene.name, trajectory)
+    title = reaches(scene.name, moving, trajectory.errors) if trajectory.ok else rejected(scene.name, trajectory)
     return Drawn(
         "paths",
         paths(moving, title),

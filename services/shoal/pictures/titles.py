@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from shoal.engines.compare import Comparison
+from shoal.error_budget import ErrorBudget
 from shoal.identification import Estimate
 from shoal.pictures.motion import Motion
 from shoal.pictures.numbers import length
@@ -47,11 +48,11 @@ def refines(name: str, estimates: Mapping[str, Estimate]) -> str:
     return f"{name}: {labels[0]} is off by {first:.2g}°, {labels[-1]} by {last:.2g}°"
 
 
-def ends(name: str, found: Motion) -> str:
-    """Where the last marker is at the end of a motion."""
+def ends(name: str, found: Motion, errors: ErrorBudget | None = None) -> str:
+    """Where the last marker is at the end of a motion, and how far that may be off as far as it is known."""
     marker, path = list(found.markers.items())[-1]
     place = f"({', '.join(f'{x:.3g}' for x in path[-1])})".replace("-", "−")
-    return f"{name}: {marker} is at {place} m after {found.times[-1]:.3g} s"
+    return f"{name}: {marker} is at {place} m after {found.times[-1]:.3g} s{_known(errors)}"
 
 
 def rejected(name: str, trajectory: Trajectory) -> str:
@@ -59,12 +60,16 @@ def rejected(name: str, trajectory: Trajectory) -> str:
     return f"{name}: not to be trusted ({trajectory.status[0]})"
 
 
-def reaches(name: str, found: Motion) -> str:
+def reaches(name: str, found: Motion, errors: ErrorBudget | None = None) -> str:
     """How far the marker that moves most goes."""
     spans = {marker: np.ptp(path, axis=0) for marker, path in found.markers.items()}
     marker = max(spans, key=lambda one: float(np.max(spans[one])))
     *first, last = (f"{length(float(span))} in {axis}" for span, axis in zip(spans[marker], "xyz", strict=False))
-    return f"{name}: {marker} moves within {', '.join(first)} and {last} in {found.span:.3g} s"
+    return f"{name}: {marker} moves within {', '.join(first)} and {last} in {found.span:.3g} s{_known(errors)}"
+
+
+def _known(errors: ErrorBudget | None) -> str:
+    return f"; known error {length(errors.total)}" if errors is not None and errors.estimates else ""
 
 
 def agrees(comparison: Comparison, marker: str) -> str:
@@ -73,8 +78,7 @@ def agrees(comparison: Comparison, marker: str) -> str:
     if not found or None in found:
         return f"{comparison.scene.name}: {marker} by each engine"
     apart = f"{len(comparison.trajectories)} engines place {marker} within {length(max(found))} of each other"
-    shared = f"; known error of their model {length(comparison.errors.total)}" if comparison.errors.estimates else ""
-    return f"{comparison.scene.name}: {apart}{shared}"
+    return f"{comparison.scene.name}: {apart}{_known(comparison.errors)}"
 
 
 def _error(estimate: Estimate) -> float:
