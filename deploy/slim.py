@@ -15,11 +15,10 @@ from pathlib import Path
 UNREAD = (
     "casadi/include",
     "pyarrow/include",
-    "prefect/server/ui",
     "prefect/server/ui-v2",
     *(f"{name}/**/tests" for name in ("numba", "numpy", "pandas", "pyarrow", "scipy", "sklearn")),
 )
-"""Folders: what compilers and the authors of the packages need, and the sources of Prefect's pages beside the pages."""
+"""Folders: what compilers and the authors of the packages need, and the set of Prefect's pages that is not served."""
 
 
 def slim(packages: Path) -> int:

@@ -15,6 +15,7 @@ from socket import gethostname
 from typing import Any
 from urllib.request import Request, urlopen
 
+from shoal.csrf import csrf_headers
 from shoal.home import stated_home
 from shoal.shelf import shelf
 
@@ -60,8 +61,7 @@ def refresh(own: Names | None = None, identity: str | None = None) -> str:
             if different := different or _difference(schema, identity):
                 continue
             if _renewed(schema, own):
-                where = f"{address()}/deployments/{deployment['id']}"
-                _asked(where, "PATCH", {"parameter_openapi_schema": schema})
+                _asked(f"deployments/{deployment['id']}", "PATCH", {"parameter_openapi_schema": schema})
     return different
 
 
@@ -73,8 +73,7 @@ def difference() -> str:
 
 
 def _deployments() -> list[Any]:
-    server = address()
-    return [] if server is None else list(_asked(f"{server}/deployments/filter", "POST", {}))
+    return [] if address() is None else list(_asked("deployments/filter", "POST", {}))
 
 
 def _difference(schema: Any, identity: str | None = None) -> str:
@@ -140,11 +139,11 @@ def _renewed(schema: Any, own: Names | None) -> bool:
     return sum(_renewed(one, own) for one in schema.values()) > 0
 
 
-def _asked(url: str, method: str, data: object) -> Any:
-    headers = {"Content-Type": "application/json"}
-    if key := os.environ.get("PREFECT_API_KEY"):
-        headers["Authorization"] = f"Bearer {key}"
-    request = Request(url, json.dumps(data).encode(), headers, method=method)
+def _asked(path: str, method: str, data: object) -> Any:
+    api, key = str(address()), os.environ.get("PREFECT_API_KEY")
+    authorized = {"Authorization": f"Bearer {key}"} if key else {}
+    headers = {"Content-Type": "application/json", **authorized, **csrf_headers(api, SECONDS, authorized)}
+    request = Request(f"{api}/{path}", json.dumps(data).encode(), headers, method=method)
     with urlopen(request, timeout=SECONDS) as answer:
         content = answer.read()
     return json.loads(content) if content else None

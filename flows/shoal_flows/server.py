@@ -106,7 +106,14 @@ class _Kept:
         descriptor = self._socket.fileno()
         with self.log.open(mode) as log:
             return subprocess.Popen(
-                [sys.executable, "-m", "shoal_flows.attached", "shoal_flows.embedded", str(descriptor)],
+                [
+                    sys.executable,
+                    "-m",
+                    "shoal_flows.attached",
+                    "shoal_flows.prefect_server",
+                    "--descriptor",
+                    str(descriptor),
+                ],
                 stdout=log,
                 stderr=subprocess.STDOUT,
                 stdin=subprocess.PIPE,

@@ -7,11 +7,13 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Mapping
 from contextlib import suppress
 from urllib.error import URLError
 from urllib.request import urlopen
 
 from rich.console import Console
+from shoal.api.guard import SETTING, is_wildcard
 from shoal.errors import ComputationError, InputError
 from shoal.ports import check_free
 
@@ -31,15 +33,18 @@ def ui(host: str, port: int) -> None:
     check_free(host, port)
     # A service manager asks with SIGTERM for what a person does with Ctrl-C.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    process = _start(_mlflow(host, port), "mlflow-ui.log")
+    process = _start(_mlflow(host, port), "mlflow-ui.log", with_host(host))
     try:
         _wait(process, host, port)
         console.print(f"MLflow:  http://{host}:{port}  (Ctrl-C stops it)", soft_wrap=True)
+        if is_wildcard(host) and not os.environ.get(SETTING):
+            text = f"{SETTING} is empty: other machines are refused; list the names by which they reach this one"
+            console.print(text, soft_wrap=True)
         latest = latest_study(f"http://{host}:{port}")
         if latest is not None:
             console.print(f"the latest study:  {latest[0]}", soft_wrap=True)
             console.print(f"all studies:       {latest[1]}", soft_wrap=True)
-        where = f"PREFECT_HOME={os.environ['PREFECT_HOME']} {sys.executable} -m prefect server start"
+        where = f"PREFECT_HOME={os.environ['PREFECT_HOME']} {sys.executable} -m shoal_flows.prefect_server"
         console.print(f"Prefect's flow runs: {where}", soft_wrap=True)
         while process.poll() is None:
             time.sleep(0.3)
@@ -57,11 +62,22 @@ def _mlflow(host: str, port: int) -> list[str]:
     return [sys.executable, "-m", "mlflow", "server", "--app-name", "shoal", *address, *store]
 
 
-def _start(command: list[str], log: str) -> subprocess.Popen[bytes]:
+def with_host(host: str) -> dict[str, str]:
+    """Return the environment of a server that answers to the address that it listens on."""
+    names = [os.environ.get(SETTING, ""), "" if is_wildcard(host) else host]
+    return {**os.environ, SETTING: ",".join(filter(None, names))}
+
+
+def _start(command: list[str], log: str, environment: Mapping[str, str]) -> subprocess.Popen[bytes]:
     with (settings.log_folder() / log).open("wb") as out:
         # Its own session: Ctrl-C reaches this process only, which then stops the server and its workers together.
         return subprocess.Popen(
-            command, stdout=out, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, start_new_session=True
+            command,
+            env=dict(environment),
+            stdout=out,
+            stderr=subprocess.STDOUT,
+            stdin=subprocess.DEVNULL,
+            start_new_session=True,
         )
 
 

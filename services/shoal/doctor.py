@@ -8,6 +8,7 @@ import platform
 import socket
 import sqlite3
 import sys
+from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -19,6 +20,7 @@ from urllib.request import Request, urlopen
 
 import numpy as np
 
+from shoal.csrf import csrf_headers
 from shoal.errors import ShoalError
 from shoal.home import compiled, home, kernel_cache, origin, unused_home
 from shoal.ports import PORTS
@@ -170,7 +172,11 @@ def check_nights(address: str) -> Check:
             "state": {"type": {"any_": ["SCHEDULED"]}},
         }
         chosen = {"deployments": {"id": {"any_": [deployment["id"]]}}, "flow_runs": future}
-        coming = _asked(f"{api}/flow_runs/filter", {**chosen, "sort": "EXPECTED_START_TIME_ASC"})
+        coming = _asked(
+            f"{api}/flow_runs/filter",
+            {**chosen, "sort": "EXPECTED_START_TIME_ASC"},
+            csrf_headers(api, PATIENCE),
+        )
     except HTTPError as error:
         if error.code == 404:
             return Check(what, False, f"{api} has no deployment nightly/validation", "state it: make up")
@@ -188,10 +194,12 @@ def check_nights(address: str) -> Check:
     return Check(what, True, f"{len(coming)} scheduled, the next at {coming[0]['expected_start_time']}{idle}")
 
 
-def _asked(url: str, data: object = None) -> Any:
+def _asked(url: str, data: object = None, headers: Mapping[str, str] | None = None) -> Any:
     """What a server answers. Raises URLError, OSError, ValueError."""
     body = None if data is None else json.dumps(data).encode()
-    with urlopen(Request(url, body, {"Content-Type": "application/json"}), timeout=PATIENCE) as answer:
+    with urlopen(
+        Request(url, body, {"Content-Type": "application/json", **(headers or {})}), timeout=PATIENCE
+    ) as answer:
         return json.load(answer)
 
 

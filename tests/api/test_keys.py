@@ -20,7 +20,7 @@ def test_keys(tmp_path: Path) -> None:
     program = create_program("gauss", Settings(keys_file=keys))
 
     async def status(path: str, method: str, key: str) -> int:
-        async with httpx.AsyncClient(transport=httpx.ASGITransport(program), base_url="http://test") as client:
+        async with httpx.AsyncClient(transport=httpx.ASGITransport(program), base_url="http://127.0.0.1") as client:
             answer = await client.request(
                 method, path, json={"name": "misfit"}, headers={"X-API-Key": key.encode()} if key else {}
             )

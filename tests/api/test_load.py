@@ -55,7 +55,7 @@ def crowd(settings: Settings, machine: Machine, clients: int, seconds: float) ->
 @pytest.mark.parametrize("router", [routes.health, routes.v1, routes.jobs, routes.by_id, umbridge.router])
 def test_nothing_of_a_call_goes_to_another_thread(router: APIRouter) -> None:
     """What is no coroutine runs on a thread of its own; two such dependencies were half of a call's overhead."""
-    assert inspect.iscoroutinefunction(program.require_key)
+    assert inspect.iscoroutinefunction(program.state_key)
     for route in router.routes:
         assert isinstance(route, APIRoute)
         parts = [route.dependant]

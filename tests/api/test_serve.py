@@ -16,7 +16,11 @@ from pathlib import Path
 import httpx
 import pytest
 from click.testing import CliRunner
-from running import eventually
+from running import eventually, listening, port_of
+from shoal.api import connection
+from shoal.api.program import create_program
+from shoal.api.serve import configured
+from shoal.api.settings import Settings
 from shoal.cli import main
 from shoal.engines import get_engine
 from shoal.errors import ComputationError
@@ -93,6 +97,16 @@ def test_what_is_no_certificate(files: tuple[str | None, str | None], line: str,
     result = CliRunner().invoke(main, ["serve", "gauss", *options])
     assert (result.exit_code, len(result.stderr.splitlines())) == (2, 1), result.exception
     assert line in result.stderr
+
+
+@needs_openssl
+def test_a_handshake_that_never_ends(pair: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is not yet a connection of which the protocol knows."""
+    monkeypatch.setattr(connection, "HANDSHAKE_SECONDS", 0.5)
+    program = create_program("gauss", Settings())
+    config = configured(program, port=0, log_config=None, lifespan="off", ssl_certfile=pair[0], ssl_keyfile=pair[1])
+    with listening(config) as server, socket.create_connection(("127.0.0.1", port_of(server)), 60) as half:
+        assert half.recv(1) == b""
 
 
 @pytest.mark.slow

@@ -19,6 +19,8 @@ PATIENCE = 180_000
 THEIRS = (
     "/favicon.ico",  # Prefect's server has no icon,
     "/ico/undefined.svg",  # nor one for every state of a run.
+    "/ajax-api/3.0/mlflow/assistant/config",  # MLflow's assistant is switched off.
+    "/ajax-api/3.0/mlflow/assistant/providers",
     "/ajax-api/2.0/mlflow/users/current",  # MLflow's pages ask for a login, which a server without one lacks.
 )
 """What a console may complain about: missing files of Prefect and MLflow, which no user sees."""

@@ -42,7 +42,7 @@ def struck(when: str, blow: Callable[[], None]) -> Iterator[list[str]]:
 
 def own_server() -> psutil.Process:
     """The server that this process has started."""
-    (found,) = (child for child in psutil.Process().children() if "shoal_flows.embedded" in child.cmdline())
+    (found,) = (child for child in psutil.Process().children() if "shoal_flows.prefect_server" in child.cmdline())
     return found
 
 

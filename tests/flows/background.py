@@ -13,7 +13,7 @@ from typing import Any
 from urllib.parse import urlsplit
 from urllib.request import Request, urlopen
 
-from deployed import PATIENCE, artifacts_of, call
+from deployed import PATIENCE, artifacts_of, call, token
 
 OFTEN = {
     "PREFECT_SERVER_SERVICES_SCHEDULER_LOOP_SECONDS": "5",
@@ -67,7 +67,7 @@ def comes_by_itself(prefect: str, name: str, parameters: Mapping[str, object]) -
         return [run for run in ours if run["state_type"] != "CANCELLED"]
 
     run = until(begun, "a run of the schedule")[0]
-    delete = Request(f"{schedules}/{schedule['id']}", method="DELETE")
+    delete = Request(f"{schedules}/{schedule['id']}", headers=token(schedules), method="DELETE")
     until(lambda: urlopen(delete, timeout=30).close() is None, "the schedule is gone")
     return dict(run)
 

@@ -17,6 +17,8 @@ from typing import Any
 from urllib.error import HTTPError
 from urllib.request import Request, urlopen
 
+from shoal.csrf import csrf_headers
+
 PORTS = ("MLFLOW", "PREFECT", "WORKER", "NIGHTLY", "GAUSS", "EXUDYN", "CASADI", "POSTGRES")
 SERVICES = ("gauss", "exudyn", "casadi")
 PATIENCE = 600.0
@@ -26,7 +28,7 @@ PATIENCE = 600.0
 def call(address: str, data: dict[str, Any] | None = None) -> Any:
     """What a server answers; one that has too much to do (503) is asked again, as Prefect's own client does."""
     body = None if data is None else json.dumps(data).encode()
-    request = Request(address, body, {"Content-Type": "application/json"})
+    request = Request(address, body, {"Content-Type": "application/json", **({} if body is None else token(address))})
     for pause in (0.5, 1, 2, 4, 8, 16, 0):
         try:
             with urlopen(request, timeout=30) as answer:
@@ -35,6 +37,11 @@ def call(address: str, data: dict[str, Any] | None = None) -> Any:
             if error.code != 503 or not pause:
                 raise
             time.sleep(pause)
+
+
+def token(address: str) -> dict[str, str]:
+    """Headers with which Prefect's server lets a request change something; MLflow's asks for none."""
+    return {} if "/mlflow/" in address else csrf_headers(f"{address.partition('/api/')[0]}/api", 60)
 
 
 def of_home(home: Path) -> set[int]:

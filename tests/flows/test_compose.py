@@ -186,9 +186,24 @@ def test_servers_are_as_quiet_as_on_a_desk(tmp_path: Path) -> None:
         "DO_NOT_TRACK",
         "PREFECT_SERVER_ANALYTICS_ENABLED",
         "PREFECT_SERVER_UI_V2_ENABLED",
+        "PREFECT_SERVER_CSRF_PROTECTION_ENABLED",
         "MLFLOW_DISABLE_TELEMETRY",
     ):
         assert stated[name] == quiet[name]
+
+
+def test_who_may_use_the_servers_is_as_on_a_desk(tmp_path: Path) -> None:
+    """Pages of Prefect's own origins; names of the other containers and what an operator adds; no pages of Dask's."""
+    stated = SERVICES["prefect"]["environment"]
+    origins = stated["PREFECT_SERVER_CORS_ALLOWED_ORIGINS"].replace("${SHOAL_PREFECT_PORT:-4200}", "4200")
+    assert origins == settings.guarded(4200)["PREFECT_SERVER_CORS_ALLOWED_ORIGINS"]
+    for name in ("mlflow", "prefect", "gauss", "exudyn", "casadi", "dask-scheduler", "dask-worker"):
+        hosts = SERVICES[name]["environment"]["SHOAL_ALLOWED_HOSTS"].split(",")
+        assert "${SHOAL_ALLOWED_HOSTS:-}" in hosts
+        assert {"mlflow", "prefect", "gauss", "exudyn", "casadi"} <= set(hosts)
+    routes = {name: value for name, value in settings.defaults(tmp_path).items() if name.endswith("HTTP__ROUTES")}
+    for name in ("dask-scheduler", "dask-worker"):
+        assert routes.items() <= SERVICES[name]["environment"].items()
 
 
 def test_the_server_keeps_the_same_and_as_long_as_on_a_desk(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -246,6 +261,20 @@ def test_the_image_leaves_out_what_no_service_reads(tmp_path: Path) -> None:
     left = {path.relative_to(tmp_path).as_posix(): path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
     assert left == {name: content for name, content in files.items() if name not in gone}
     assert (tmp_path / "casadi/libipopt.so").is_symlink()
+
+
+def test_the_image_keeps_the_pages_that_prefect_serves(tmp_path: Path) -> None:
+    """Those of the first set; without their files the server has no pages, and says nothing."""
+    import prefect
+
+    packages = Path(prefect.__file__).parents[1]
+    pages = [Path(path).relative_to(packages) for path in (prefect.__ui_static_path__, prefect.__ui_v2_static_path__)]
+    for folder in pages:
+        (tmp_path / folder).mkdir(parents=True)
+        (tmp_path / folder / "index.html").write_text("page")
+    subprocess.run([sys.executable, str(ROOT / "deploy" / "slim.py"), str(tmp_path)], check=True, capture_output=True)
+    assert [(tmp_path / folder).exists() for folder in pages] == [True, False]
+    assert (Path(prefect.__ui_static_path__) / "index.html").exists()
 
 
 @pytest.mark.skipif(shutil.which("strip") is None, reason="needs binutils, as the stage that builds the image has")

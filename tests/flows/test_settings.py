@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from shoal.errors import InputError
 from shoal_flows import events, settings
+from shoal_flows import ui as of_ui
 from shoal_flows.ui import ui
 
 
@@ -40,6 +41,12 @@ def test_ui_names_the_server_that_has_the_runs(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setenv("MLFLOW_TRACKING_URI", "http://tracking:5000")
     with pytest.raises(InputError, match="the runs are on http://tracking:5000"):
         ui("127.0.0.1", 5000)
+
+
+def test_pages_of_an_address_are_reached_under_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SHOAL_ALLOWED_HOSTS", "shoal.example.org")
+    assert of_ui.with_host("192.0.2.7")["SHOAL_ALLOWED_HOSTS"] == "shoal.example.org,192.0.2.7"
+    assert of_ui.with_host("0.0.0.0")["SHOAL_ALLOWED_HOSTS"] == "shoal.example.org"
 
 
 def test_work_is_announced_with_its_end() -> None:

@@ -139,7 +139,7 @@ def test_a_study_outlives_prefects_server(tmp_path: Path, undisturbed: Mapping[s
         # Readable without the server as well, by `shoal ui` and `shoal rerun`.
         assert list((tmp_path / "artifacts").rglob("trajectory.csv"))
         run = begun(tmp_path, at)
-        assert kill(tmp_path, "prefect", "server", "start") >= 1
+        assert kill(tmp_path, "shoal_flows.prefect_server") >= 1
         check_study(at, run, undisturbed)
         assert "prefect ended by itself: it is started again" in (tmp_path / "up.log").read_text()
         check_afterwards(tmp_path, at, scheduled, run)
@@ -169,7 +169,7 @@ def test_a_night_that_was_broken_off_does_not_block_the_next(tmp_path: Path) -> 
 
     with running(tmp_path, "--with", "nightly", *WITHOUT, settings=OFTEN) as at:
         holds_the_slot(at["PREFECT"])
-        assert kill(tmp_path, "prefect", "server", "start") >= 1
+        assert kill(tmp_path, "shoal_flows.prefect_server") >= 1
         assert kill(tmp_path, "prefect.engine") >= 1
         until(lambda: slots_taken(at["PREFECT"]) == 0, "the slot is free")
         assert run_deployment(at["PREFECT"], "nightly/validation", short)["state_type"] == "COMPLETED"

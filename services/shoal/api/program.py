@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-import hmac
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from functools import partial
 from typing import Annotated
 
-from fastapi import Depends, FastAPI, Request, Security
+from fastapi import Depends, FastAPI, Security
 from fastapi.exceptions import RequestValidationError
 from fastapi.security import APIKeyHeader
 from starlette.exceptions import HTTPException
 
 from shoal.api import routes, umbridge
+from shoal.api.access import AccessLog
+from shoal.api.connection import Crowd
+from shoal.api.guard import Guard, allowed_hosts
 from shoal.api.jobs import Jobs
 from shoal.api.pool import Pool
 from shoal.api.refusal import Refusal, on_failure, on_refusal
@@ -25,19 +27,21 @@ from shoal.versions import versions
 _header = APIKeyHeader(name="X-API-Key", auto_error=False)
 
 
-async def require_key(request: Request, given: Annotated[str | None, Security(_header)] = None) -> None:
-    """Raises Refusal where keys are asked for and none of them is given."""
-    keys: tuple[bytes, ...] = request.app.state.keys
-    # Every key is compared, each in constant time, so that the time tells nothing.
-    matches = [hmac.compare_digest((given or "").encode(), key) for key in keys]
-    if not any(matches):
-        raise Refusal("unauthorized", "X-API-Key: the key is missing or not known", "X-API-Key")
+async def state_key(_: Annotated[str | None, Security(_header)] = None) -> None:
+    """State in /openapi.json that endpoints ask for a key; `strict.StrictRoute` checks it before a body is read."""
 
 
-def create_program(engine: str, settings: Settings | None = None, make_engine: MakeEngine | None = None) -> FastAPI:
-    """The program that serves an engine. Raises InputError.
+def create_program(
+    engine: str,
+    settings: Settings | None = None,
+    make_engine: MakeEngine | None = None,
+    *,
+    listening: str = "127.0.0.1",
+) -> FastAPI:
+    """Return the program that serves an engine. Raises InputError.
 
-    settings: else those of the environment; make_engine: called in every worker, else the engine of that name is made
+    settings: else those of the environment; make_engine: called in every worker, else the engine of that name is made;
+    listening: the address under which it is served, one of the hosts that it answers to
     """
     settings = settings or Settings.read()
     worker = partial(Worker, make_engine or partial(get_engine, engine), settings)
@@ -63,7 +67,7 @@ def create_program(engine: str, settings: Settings | None = None, make_engine: M
         redoc_url=None,
     )
     program.state.settings, program.state.keys = settings, settings.keys()
-    guard = [Depends(require_key)] if program.state.keys else []
+    guard = [Depends(state_key)] if program.state.keys else []
     program.include_router(routes.health)
     for router in (routes.v1, routes.library, routes.jobs, routes.earlier, umbridge.router):
         program.include_router(router, dependencies=guard)
@@ -72,4 +76,8 @@ def create_program(engine: str, settings: Settings | None = None, make_engine: M
     for kind in (Refusal, RequestValidationError, HTTPException):
         program.add_exception_handler(kind, on_refusal)
     program.add_exception_handler(Exception, on_failure)
+    # The last is the outermost.
+    program.add_middleware(Crowd, most=settings.connections)
+    program.add_middleware(Guard, hosts=allowed_hosts(listening))
+    program.add_middleware(AccessLog)
     return program

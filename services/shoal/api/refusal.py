@@ -17,7 +17,9 @@ MEDIA_TYPE = "application/problem+json"
 KINDS: dict[str, tuple[int, str]] = {
     "malformed": (400, "The body is not the JSON that this service reads"),
     "unsupported": (400, "The model does not offer that"),
+    "host": (400, "The request is for a host that this server does not answer to"),
     "unauthorized": (401, "A valid API key is needed"),
+    "origin": (403, "Pages of other origins may not use this server"),
     "not-found": (404, "There is no such thing here"),
     "method-not-allowed": (405, "The method does not suit this address"),
     "too-slow": (408, "The request took too long to arrive"),
@@ -29,6 +31,7 @@ KINDS: dict[str, tuple[int, str]] = {
     "computation": (500, "The computation failed"),
     "crashed": (500, "The worker that computed it died"),
     "internal": (500, "The service failed"),
+    "crowded": (503, "More requests are open than this service takes"),
     "not-ready": (503, "The service is not ready"),
     "timeout": (504, "The computation took longer than it may"),
 }

@@ -20,11 +20,12 @@ Seconds = Annotated[float, Field(gt=0)]
 class Settings(BaseSettings):
     """Limits of one service.
 
-    keys_file: one API key per line; without it nobody is asked for one
+    keys_file: one API key per line, after its name if it has one; without the file nobody is asked for a key
     workers, job_workers: processes for single calls and for identifications
     queue, job_queue: how many may wait for a worker; more are told to come again
     connections: open at once
-    body_bytes, json_depth, receive_seconds: of a request
+    header_seconds: until a request's headers are complete
+    body_bytes, json_depth, receive_seconds: of a request's body
     wall_seconds, job_seconds: a computation that takes longer is ended
     max_work: steps x elements x lanes of a simulation (a rigid body counts as one element)
     max_elements: of a scene; max_values: samples x markers x lanes of a result
@@ -44,6 +45,7 @@ class Settings(BaseSettings):
     connections: Count = 256
     body_bytes: Count = 8 * 2**20
     json_depth: Count = 32
+    header_seconds: Seconds = 10.0
     receive_seconds: Seconds = 30.0
     wall_seconds: Seconds = 60.0
     job_seconds: Seconds = 600.0
@@ -66,15 +68,23 @@ class Settings(BaseSettings):
             name, _, rest = str(one_line(error, PREFIX)).removeprefix(f"{PREFIX}: ").partition(": ")
             raise InputError(f"{PREFIX}{name.upper()}: {rest}") from None
 
-    def keys(self) -> tuple[bytes, ...]:
-        """The API keys; none if anybody may ask. Raises InputError."""
+    def keys(self) -> dict[bytes, str]:
+        """Return the API keys with their names; none if anybody may ask. Raises InputError.
+
+        A line is `KEY` or `NAME KEY`; a key without a name is called by its line, as in `key 2`.
+        """
         if self.keys_file is None:
-            return ()
+            return {}
         try:
             lines = self.keys_file.read_text(encoding="utf-8").splitlines()
         except (OSError, UnicodeDecodeError) as error:
             raise InputError(f"{PREFIX}KEYS_FILE: {self.keys_file} cannot be read: {error}") from None
-        keys = tuple(line.strip().encode() for line in lines if line.strip())
+        keys = {}
+        for number, words in enumerate(map(str.split, lines), 1):
+            if len(words) > 2:
+                raise InputError(f"{PREFIX}KEYS_FILE: line {number} of {self.keys_file} is not KEY or NAME KEY")
+            if words:
+                keys[words[-1].encode()] = words[0] if len(words) == 2 else f"key {number}"
         if not keys:
             raise InputError(f"{PREFIX}KEYS_FILE: {self.keys_file} holds no key; write one per line")
         return keys

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import hmac
 import json
 from collections import Counter
 from collections.abc import Callable, Coroutine
@@ -12,6 +13,7 @@ import orjson
 from fastapi import Request, Response
 from fastapi.routing import APIRoute
 
+from shoal.api.access import KEY_NAME
 from shoal.api.refusal import Refusal
 from shoal.api.settings import Settings
 
@@ -56,14 +58,26 @@ class StrictRequest(Request):
         return data
 
 
+def check_key(request: Request) -> None:
+    """Keep the name of the API key that a request shows. Raises Refusal where keys are asked for and it shows none."""
+    keys: dict[bytes, str] = request.app.state.keys
+    given = request.headers.get("X-API-Key", "").encode()
+    # Every key is compared, each in constant time, so that the time tells nothing.
+    matches = [name for key, name in keys.items() if hmac.compare_digest(given, key)]
+    if keys and not matches:
+        raise Refusal("unauthorized", "X-API-Key: the key is missing or not known", "X-API-Key")
+    setattr(request.state, KEY_NAME, matches[0] if matches else None)
+
+
 class StrictRoute(APIRoute):
-    """A route whose requests are strict ones."""
+    """A route whose requests are strict ones; nobody without a key has a body read."""
 
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
         """The handler that FastAPI calls."""
         inner = super().get_route_handler()
 
         async def handler(request: Request) -> Response:
+            check_key(request)
             return await inner(StrictRequest(request.scope, request.receive))
 
         return handler
