@@ -8,6 +8,7 @@ This is an order of magnitude. It prunes only where it is far from the tolerance
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,11 +22,10 @@ from shoal.scene import (
     DistributedForce,
     Force,
     Function,
+    PointMass,
     Rod,
     Scene,
-    Spring,
     Torque,
-    TorsionSpring,
     Weld,
 )
 from shoal.scene.dimensions import padded
@@ -88,28 +88,30 @@ def _probed(scene: Scene, rods: tuple[str, ...]) -> Scene:
     return scene.with_values({"markers": markers, **settings})
 
 
-def _run(scene: Scene, times: Array) -> Trajectory | None:
+def _run(scene: Scene, times: Array, values: Mapping[str, Any] | None = None) -> Trajectory | None:
     try:
-        motion = GaussEngine().simulate(scene, times[1:])
+        motion = GaussEngine().simulate(scene.with_values(values) if values else scene, times[1:])
     except InputError:
         return None
     return motion if motion.ok else None
 
 
 def _growth(scene: Scene, times: Array, motion: Trajectory) -> float:
-    """Largest displacement of the scene's own markers per displacement at the start."""
-    largest = 0.0
+    """Return the largest displacement of the markers per displacement at the start; nan where no start can vary."""
+    found = []
     for name, body in scene.bodies.items():
         length = body.length if isinstance(body, Rod) else 1.0
         for values in _nudged(scene, name):
-            near = _run(scene.with_values(values), times)
+            near = _run(scene, times, values)
             if near is not None:
-                largest = max(largest, near.distance(motion) / (NUDGE * length))
-    return largest
+                found.append(near.distance(motion) / (NUDGE * length))
+    return max(found, default=np.nan)
 
 
 def _nudged(scene: Scene, name: str) -> list[dict[str, Any]]:
-    """Starts in which one body is turned a little: in the plane, or about each axis of the ground."""
+    """Return starts in which one body is turned a little: in the plane, or about each axis of the ground."""
+    if isinstance(scene.bodies[name], PointMass):
+        return []
     start = scene.start(name)
     if scene.dimensions == 2:
         return [{f"initial.{name}.angle": start.angle + NUDGE}]
@@ -145,7 +147,10 @@ def _deflection(scene: Scene, name: str, rod: Rod, motion: Trajectory) -> float:
 
 
 def _applied(scene: Scene, name: str, rod: Rod) -> tuple[float, float]:
-    """Sum of the forces [N] and torques [N m] on a rod; nan where they depend on time or on the motion."""
+    """Return the sums of the forces [N] and torques [N m] on a rod; nan where they depend on time or on the motion.
+
+    Loads of any other kind depend on the motion.
+    """
     force, moment = 0.0, 0.0
     for load in scene.loads.values():
         if isinstance(load, DistributedForce) and load.body == name:
@@ -154,10 +159,8 @@ def _applied(scene: Scene, name: str, rod: Rod) -> tuple[float, float]:
             force += float(np.linalg.norm(load.force)) * _constant(load.scale)
         elif isinstance(load, Torque) and name in {side.body for side in sides(load).values()}:
             moment += _constant(load.torque)
-        elif isinstance(load, Spring | TorsionSpring) and name in {side.body for side in sides(load).values()}:
+        elif name in {side.body for side in sides(load).values()}:
             force = np.nan
-        elif not isinstance(load, DistributedForce | Force | Torque | Spring | TorsionSpring):
-            raise NotImplementedError(f"prior: no force is known of a load of kind {load.kind}")
     return force, moment
 
 
