@@ -141,6 +141,43 @@ def test_random_rotors_that_are_not_round_on_round_bearings_in_the_turning_frame
     assert 0 < grew < 8
 
 
+def test_a_free_body_turns_about_its_principal_axes_as_euler_says() -> None:
+    """Beside a turn W about the axis of C: W ((C - A)(C - B) / (A B))^1/2; it grows about the middle one."""
+    rng = np.random.default_rng(57)
+    for k in range(6):
+        small, large = np.sort(rng.uniform(0.02, 0.04, 2))
+        moments = np.array([small, (small + large) / 2, large])
+        speed, axis = rng.uniform(10.0, 100.0), k % 3
+        spin = (speed * np.eye(3)[axis]).tolist()
+        glide = (rng.normal() * (k > 2) * np.eye(3)[axis]).tolist()
+        body = {"kind": "rigid-body", "mass": 2.0, "inertia": moments.tolist()}
+        start = {"b": {"position": [0.1, 0.2, 0.3], "spin": spin, "velocity": glide}}
+        found = modes(in_space({"b": body}, start))
+        c, (a, b) = moments[axis], np.delete(moments, axis)
+        square = speed**2 * (c - a) * (c - b) / (a * b)
+        if square < 0:
+            assert found.verdict[0] == "unstable"
+            assert found.modes[0].eigenvalue == pytest.approx(np.sqrt(-square), rel=1e-6)
+        else:
+            assert found.ok, found.message
+            value = next(mode for mode in found.modes if mode.eigenvalue != 0)
+            shifts = [0.0] if value.rotating else [-speed, speed]
+            turned = [abs(value.eigenvalue.imag + shift) for shift in shifts]
+            assert min(abs(one - np.sqrt(square)) for one in turned) < 1e-6 * speed
+
+
+def test_a_rod_by_modes_that_turns_is_not_answered() -> None:
+    """Linear modes in a turning frame lack the centrifugal stiffening: at this speed they would call it unstable."""
+    ground = {"body": "ground", "point": [0.0, 0.0]}
+    rod = {"kind": "rod", "length": 1.0, "height": 0.02, "width": 0.02, "density": 2700.0, "youngs_modulus": 7e10,
+           "element": "modal", "modes": 4}  # fmt: skip
+    scene = Scene.parse({"name": "blade", "gravity": [0.0, 0.0], "bodies": {"b": rod},
+                         "joints": {"O": {"first": ground, "second": {"body": "b"}}},
+                         "initial": {"b": {"rate": 350.0}},
+                         "markers": {"e": {"body": "b", "point": "end"}}})  # fmt: skip
+    assert "bodies.b lack the centrifugal stiffening" in modes(scene).verdict[1]
+
+
 def test_a_rotor_that_is_not_round_on_bearings_that_are_not_is_refused() -> None:
     stations = np.array([-0.4, 0.3])
     uneven = bearings(stations, np.array([[1e4, 2e4], [1e4, 2e4]]), np.zeros((2, 2)))

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from shoal.arguments import check, one_of
 from shoal.error_budget import ErrorBudget
-from shoal.errors import ComputationError
+from shoal.errors import ComputationError, InputError
 from shoal.mechanics.analysis import left_out
 from shoal.mechanics.analysis.balance import BALANCED, Balance
 from shoal.mechanics.analysis.damped import small
@@ -257,9 +257,25 @@ def modes(
         try:
             return modes_of_motion(scene, evaluator, q, v, about=about, time=time, count=count)[0]
         except NotSteadyError as error:
-            moving = str(error).removeprefix(f"{scene.name}: ")
+            moving = f"{str(error).removeprefix(f'{scene.name}: ')}{_but_for_gravity(scene, about)}"
     found = modes_at_rest(scene, about=about, time=time, count=count, leave_unstable=leave_unstable)
     return replace(found, moving=moving)
+
+
+def _but_for_gravity(scene: Scene, about: str) -> str:
+    """What helps a motion that gravity alone keeps from being steady, as that of a flexible shaft that lies."""
+    if not np.any(scene.gravity):
+        return ""
+    try:
+        weightless = scene.with_values({"gravity": [0.0] * scene.dimensions})
+        evaluator = Evaluator.of(weightless)
+        q, v = (part[:, 0].copy() for part in (evaluator.model.q0, evaluator.model.v0))
+        steady_motion(weightless, place(weightless), evaluator, q, v, 0.0, seek=about == "equilibrium")
+    except (ComputationError, InputError):
+        return ""
+    zeros = ",".join("0" * scene.dimensions)
+    shaft = " (or take element ancf-cable for a shaft)" if scene.flexible_rods and scene.dimensions == 3 else ""
+    return f"; gravity alone acts against it: it is steady with --set gravity=[{zeros}]{shaft}"
 
 
 def is_moving(evaluator: Evaluator, time: float) -> bool:

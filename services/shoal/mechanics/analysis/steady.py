@@ -46,6 +46,8 @@ ANGLE = 1e-3
 """Half the step of differences along the motion [rad]."""
 LOOSE = 1e-9
 """Stiffnesses below this part of the largest, or of the speed squared, hold nothing: the phase of a motion is free."""
+SHAFT = "; a shaft of element ancf-cable does not turn with its sections, and may have any bearings"
+"""Advice where a flexible rod is carried in a turning frame."""
 EXACT = 1e-9
 """Relative error of what is made of differences: of fields, by differences of accelerations, and of forces of rates."""
 MOST = 30
@@ -313,6 +315,12 @@ def steady_motion(
     seek: whether its place may be elsewhere, near, as where rods stretch; the field of the rates is that of the start.
     Raises ComputationError where there is none, with the residual acceleration in the moving frame.
     """
+    if bent := [name for name, frame in placement.frames.items() if isinstance(frame, ModalFrame)]:
+        # Kane, Ryan and Banerjee, Dynamics of a cantilever beam attached to a moving base, 1987.
+        raise NotSteadyError(
+            f"{scene.name}: the start moves, and the modes of bodies.{bent[0]} lack the centrifugal stiffening of a "
+            "rod that turns; take element ancf-cable or ancf-quintic"
+        )
     twists = Twists(placement, len(q))
     metric, size = Metric(evaluator.mass), span(scene)
     refusal: ComputationError | None = None
@@ -335,10 +343,13 @@ def _fields(twists: Twists, evaluator: Evaluator, q: Array, v: Array, t: float) 
     that has its rates.
     """
     root = np.linalg.cholesky(evaluator.mass.toarray()).T
-    pace = np.linalg.norm(root @ v)
+    pace = float(np.linalg.norm(root @ v))
     any_of = _narrowed(root @ twists.at(q), root @ v, np.zeros(twists.basis.shape[1]), None)
     a = evaluator.acceleration(q, v, t)
-    step = 1e-5 * float(np.linalg.norm(root @ v)) / max(float(np.linalg.norm(root @ a)), 1e-300)
+    unit = span(evaluator.model.scene) * np.sqrt(
+        sum(float(body.mass) for body in evaluator.model.scene.bodies.values())
+    )
+    step = 1e-5 * min(pace / max(float(np.linalg.norm(root @ a)), 1e-300), unit / pace)
     before, after = (evaluator.acceleration(q + s * v + 0.5 * s * s * a, v + s * a, t + s) for s in (-step, step))
     found = any_of
     for state, wanted in ((v, a), (a, (after - before) / (2.0 * step))):
@@ -385,7 +396,7 @@ def _checked(
         raise ComputationError(
             f"{found.scene.name}: at {found.speed:.4g} rad/s the {part} changes along the motion (by {off:.2g} of its "
             "size) in a frame at rest and in one that turns: small motions have coefficients that are periodic in "
-            "time, and no modes"
+            f"time, and no modes{SHAFT if begun.scene.flexible_rods else ''}"
         )
     return found
 

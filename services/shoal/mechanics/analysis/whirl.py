@@ -26,8 +26,8 @@ from shoal.scene import Scene
 
 ALONE = 0.9
 """A part of a mode with more than this share of its kinetic energy is the mode."""
-PLANAR = 1e-6
-"""Displacements whose forward and backward parts differ by less go to and fro."""
+PLANAR = 1e-3
+"""Orbits whose forward and backward parts differ by a smaller share go to and fro."""
 LINE = 1e-9
 """Parts across the axis below this share of a mode are none."""
 
