@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 from shoal import doctor
+from shoal_flows.deployment import processes
 
 
 def test_a_server_that_does_not_answer_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -43,6 +44,26 @@ def test_a_port_in_use_by_another_program_is_told() -> None:
         other.settimeout(5)
         found = doctor.check_port(other.getsockname()[1], "MLflow", patience=0.2).found
     assert "another program" in found
+
+
+def test_ports_are_those_that_the_environment_states(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same settings as those of `make up`; what is no port is named with its setting."""
+    monkeypatch.delenv("PREFECT_API_URL", raising=False)
+    with socket.socket() as closed:
+        closed.bind(("127.0.0.1", 0))
+        free = closed.getsockname()[1]
+        for name, port in (("PREFECT", str(free)), ("GAUSS", str(free)), ("MLFLOW", "5000x")):
+            monkeypatch.setenv(f"SHOAL_{name}_PORT", port)
+        checks = doctor.check_ports()
+        assert [check.found for check in checks if check.name == f"port {free}"] == [
+            "free for Prefect",
+            "free for gauss",
+        ]
+        assert f"no Prefect server at http://127.0.0.1:{free}/api" in checks[0].found
+        assert [check.found for check in checks if not check.ok] == [
+            "SHOAL_MLFLOW_PORT: '5000x' is not a port between 1 and 65535"
+        ]
+        assert processes.port("prefect") == free
 
 
 NIGHT = {"id": "1", "paused": False, "status": "READY", "schedules": [{"active": True}]}

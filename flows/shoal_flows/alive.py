@@ -94,6 +94,18 @@ def of_worker(worker: str) -> list[Mark]:
     return found
 
 
+def is_held(kind: str, run_id: str) -> bool:
+    """Whether a process of this home runs a run."""
+    with suppress(FileNotFoundError), (_folder() / f"{kind}-{run_id}").open("r+") as file:
+        return not _locked(file)
+    return False
+
+
+def run_ids(kind: str) -> set[str]:
+    """The runs of a kind that a process of this home has begun and not ended."""
+    return {path.name.removeprefix(f"{kind}-") for path in _marks() if path.name.startswith(f"{kind}-")}
+
+
 def _folder() -> Path:
     folder = home() / "running"
     folder.mkdir(exist_ok=True)

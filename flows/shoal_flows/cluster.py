@@ -8,13 +8,16 @@ from __future__ import annotations
 
 import atexit
 import os
+from collections.abc import Callable
 from functools import cache
 from typing import Any
+from weakref import WeakSet
 
 from shoal.errors import ComputationError, InputError
 
 PATIENCE = 30.0
 PRELOAD = "shoal_flows.preload"
+_pending: WeakSet[Any] = WeakSet()
 
 
 def setting() -> str:
@@ -38,6 +41,20 @@ def client() -> Any:
         raise ComputationError(f"SHOAL_CLUSTER: no scheduler at {wanted}: {reason}") from None
     atexit.register(found.close)
     return found
+
+
+def submit(function: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
+    """Run a function on the cluster; returns its future. Raises InputError, ComputationError."""
+    # Not by its arguments: what is asked for again may be meant to be computed again.
+    future = client().submit(function, *args, pure=False, **kwargs)
+    _pending.add(future)
+    return future
+
+
+def abandon() -> None:
+    """Cancel what was submitted and has not ended; whoever waits for it gets a CancelledError."""
+    if pending := [future for future in _pending if not future.done()]:
+        client().cancel(pending, force=True)
 
 
 def cores() -> int:

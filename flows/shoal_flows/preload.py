@@ -7,6 +7,12 @@ import sys
 import matplotlib.figure  # noqa: F401 - to have it loaded
 import shoal.engines.compare
 import shoal.identification  # noqa: F401
+from shoal.errors import ShoalError
 from shoal.mechanics.warm import warm
 
-warm(("leapfrog",), lambda line: print(line, file=sys.stderr, flush=True), every=False)  # noqa: T201 - for who waits
+failure: ShoalError | None = None
+"""Why the kernels could not be compiled: raised where a computation is asked for, as this process only forks."""
+try:
+    warm(("leapfrog",), lambda line: print(line, file=sys.stderr, flush=True), every=False)  # noqa: T201 - progress
+except ShoalError as error:
+    failure = error

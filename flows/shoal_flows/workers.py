@@ -8,14 +8,17 @@ from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from functools import cache
 from multiprocessing import active_children, get_all_start_methods, get_context, parent_process
-from threading import Thread
+from threading import Event, Thread
 from typing import ParamSpec, Protocol, TypeVar
+
+from shoal.errors import check_trusted
 
 from shoal_flows import cluster
 
 P = ParamSpec("P")
 T = TypeVar("T")
 T_co = TypeVar("T_co", covariant=True)
+_abandoned = Event()
 
 
 def count() -> int:
@@ -34,10 +37,13 @@ class Pending(Protocol[T_co]):
 
 
 def submit(function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> Pending[T]:
-    """Run a module-level function in a worker process, here or on a cluster; arguments and result are pickled."""
+    """Run a module-level function in a worker process, here or on a cluster; arguments and result are pickled.
+
+    Raises ComputationError after `abandon`.
+    """
+    check_trusted(not _abandoned.is_set(), "stopped before this computation began")
     if cluster.setting():
-        # Not by its arguments: what is asked for again may be meant to be computed again.
-        found: Pending[T] = cluster.client().submit(function, *args, pure=False, **kwargs)
+        found: Pending[T] = cluster.submit(function, *args, **kwargs)
         return found
     return _pool().submit(function, *args, **kwargs)
 
@@ -48,7 +54,12 @@ def run(function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
 
 
 def abandon() -> None:
-    """End the processes of this machine in the midst of their work; who waits for them is told."""
+    """Stop all computations: end the processes of this machine, cancel what a cluster has, and begin none any more.
+
+    Whoever waits for a result gets an exception.
+    """
+    _abandoned.set()
+    cluster.abandon()
     if _pool.cache_info().currsize:
         _pool.cache_clear()
         for process in active_children():
@@ -57,7 +68,17 @@ def abandon() -> None:
 
 def warm_up() -> Pending[int]:
     """Start the processes; they load and compile while the caller does something else. The result waits for that."""
-    return submit(os.getpid)
+    _abandoned.clear()
+    return submit(_loaded)
+
+
+def _loaded() -> int:
+    """Return the number of this process once it has everything. Raises what its preparation failed with."""
+    from shoal_flows.preload import failure
+
+    if failure is not None:
+        raise failure
+    return os.getpid()
 
 
 @cache

@@ -28,11 +28,9 @@ from shoal.commands.installation import doctor, export, export_fmu, import_scene
 from shoal.commands.inverse import design, identify
 from shoal.commands.library import library
 from shoal.commands.uncertain import uncertain
-from shoal.errors import ComputationError, InputError, ShoalError
+from shoal.errors import FULL, ComputationError, InputError, ShoalError
 from shoal.home import unused_home
 
-FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-"""No room: on the disk, for this user, in this file."""
 NO_NAME = errno.ENAMETOOLONG, errno.ELOOP
 """What is given for a file can be none, wherever one first looks for it."""
 RARELY = 500_000, 20, 20

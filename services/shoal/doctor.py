@@ -21,9 +21,9 @@ from urllib.request import Request, urlopen
 import numpy as np
 
 from shoal.csrf import csrf_headers
-from shoal.errors import ShoalError
+from shoal.errors import InputError, ShoalError
 from shoal.home import compiled, home, kernel_cache, origin, unused_home
-from shoal.ports import PORTS
+from shoal.ports import PORTS, port, setting_of
 
 _PACKAGES = {
     "pipeline": ("prefect", "mlflow"),
@@ -32,7 +32,7 @@ _PACKAGES = {
 }
 """What the extras bring that has no check of its own."""
 _PORTS = {"MLflow": 5000, "Prefect": 4200, **PORTS}
-"""Where `make up`, `shoal ui` and `shoal serve` listen unless told otherwise."""
+"""Where `make up`, `shoal ui` and `shoal serve` listen unless $SHOAL_NAME_PORT or an option says otherwise."""
 PATIENCE = 3.0
 """Seconds that a server has to answer."""
 CLOSE = 1e-4
@@ -61,8 +61,7 @@ def examine() -> list[Check]:
         check_server("Prefect", "PREFECT_API_URL", "a flow starts its own"),
         check_server("MLflow", "MLFLOW_TRACKING_URI", "runs go to a database in the state folder"),
         *check_runs(os.environ.get("MLFLOW_TRACKING_URI")),
-        check_nights(os.environ.get("PREFECT_API_URL") or "http://127.0.0.1:4200/api"),
-        *(check_port(number, what) for what, number in _PORTS.items()),
+        *check_ports(),
     ]
 
 
@@ -201,6 +200,18 @@ def _asked(url: str, data: object = None, headers: Mapping[str, str] | None = No
         Request(url, body, {"Content-Type": "application/json", **(headers or {})}), timeout=PATIENCE
     ) as answer:
         return json.load(answer)
+
+
+def check_ports() -> list[Check]:
+    """Who listens where the servers of `make up` would, and whether the night is scheduled on Prefect's there."""
+    numbers, wrong = {}, []
+    for what, default in _PORTS.items():
+        try:
+            numbers[what] = port(what, default)
+        except InputError as error:
+            wrong.append(Check(f"port of {what}", False, str(error), f"correct {setting_of(what)}, or unset it"))
+    address = os.environ.get("PREFECT_API_URL") or f"http://127.0.0.1:{numbers.get('Prefect', 4200)}/api"
+    return [check_nights(address), *wrong, *(check_port(number, what) for what, number in numbers.items())]
 
 
 def check_port(number: int, what: str, patience: float = PATIENCE) -> Check:

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import errno
+
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+"""No room: on the disk, for this user, in this file."""
+
 
 class ShoalError(Exception):
     """Base of every error a user is meant to read; one line, no traceback needed."""

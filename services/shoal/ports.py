@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import socket
 
 from shoal.engines import ENGINES
@@ -9,6 +10,20 @@ from shoal.errors import InputError
 
 PORTS = {name: 8001 + k for k, name in enumerate(dict.fromkeys(name.partition("-")[0] for name in ENGINES))}
 """Where an engine is served unless somebody says otherwise; its variants, as exudyn-ge of exudyn, take its place."""
+
+
+def port(name: str, default: int) -> int:
+    """Return the port of a server of `make up` by its name: $SHOAL_NAME_PORT, else the default. Raises InputError."""
+    setting = setting_of(name)
+    text = os.environ.get(setting) or str(default)
+    if not (text.isdecimal() and 0 < int(text) < 65536):
+        raise InputError(f"{setting}: {text!r} is not a port between 1 and 65535")
+    return int(text)
+
+
+def setting_of(name: str) -> str:
+    """Return the variable of the environment that chooses the port of a server."""
+    return f"SHOAL_{name.upper().replace('-', '_')}_PORT"
 
 
 def check_free(host: str, port: int, setting: str = "port") -> None:

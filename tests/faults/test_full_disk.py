@@ -116,6 +116,37 @@ def test_standard_output_on_a_full_disk() -> None:
     assert (ended.returncode, ended.stderr) == (3, "shoal: cannot write: No space left on device\n")
 
 
+def test_no_room_for_a_kernel_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Machine code is larger than the room; the line names the folder and what chooses another."""
+    import shoal.mechanics  # noqa: F401 - kernels are compiled its way
+    from numba.core import config
+
+    monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path / "cache"))
+    (tmp_path / "some.py").write_text("from numba import njit\n@njit(cache=True)\ndef twice(x):\n    return 2 * x\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    from some import twice
+
+    with (
+        little_room(),
+        pytest.raises(ComputationError, match=r"^compiled kernels cannot be kept in .*/cache: File too"),
+    ):
+        twice(1.5)
+
+
+@pytest.mark.slow
+def test_no_room_for_the_kernels_of_a_flow(tmp_path: Path) -> None:
+    """The process that prepares the workers says why as well."""
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "SHOAL_HOME": str(tmp_path / "home")}
+    program = PROGRAM.replace("main(sys.argv", "sys.argv[0] = ''; main(sys.argv").replace(
+        f"{ROOM}, {ROOM}", "300_000, -1"
+    )
+    command = [sys.executable, "-c", program, "run", "forward", "--json"]
+    ended = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stdout) == (3, "")
+    assert ended.stderr.splitlines()[-1].startswith(f"shoal: compiled kernels cannot be kept in {tmp_path / 'cache'}: ")
+    assert "Traceback" not in ended.stderr
+
+
 @pytest.mark.slow
 def test_a_checkpoint_on_a_full_disk(tmp_path: Path) -> None:
     """The run ends with a line that names the file; what is kept so far is read again."""

@@ -15,7 +15,7 @@ from uuid import UUID
 import pytest
 from shoal.home import home
 from shoal_flows import alive
-from shoal_flows.left import WHY, end_left
+from shoal_flows.left import UNSTARTED, WHY, Unstarted, end_left
 from shoal_flows.tracking import store
 
 OPEN = "from shoal_flows.tracking import store\nwith store.open_run('Forward', 'name') as run:\n"
@@ -105,9 +105,12 @@ def prefect() -> Iterator[Any]:
     server.start()
     server.wait()
     from prefect.client.orchestration import get_client
+    from prefect.context import get_settings_context, use_profile
 
     try:
-        with get_client(sync_client=True) as client:
+        # Another test of this process may have let Prefect read its settings before.
+        profile = use_profile(get_settings_context().profile, include_current_context=False)
+        with profile, get_client(sync_client=True) as client:
             yield client
     finally:
         server.stop()
@@ -129,6 +132,36 @@ def test_a_flow_whose_process_was_killed_is_crashed(prefect: Any) -> None:
     assert ended.is_crashed()
     assert ended.message == WHY
     assert not prefect.read_flow_run(scheduled.id).state.is_final()
+
+
+def test_a_run_that_no_process_begins_is_crashed(prefect: Any) -> None:
+    """Of this pool alone, after two looks at the same state; not one that a process holds, nor one that waits."""
+    from prefect import flow
+    from prefect.client.schemas.actions import WorkPoolCreate
+    from prefect.states import Pending, Running
+
+    @flow
+    def some() -> None:
+        pass
+
+    for pool in ("ours", "theirs"):
+        prefect.create_work_pool(WorkPoolCreate(name=pool, type="process"))
+
+    def made(state: Any, pool: str = "ours") -> Any:
+        deployment = prefect.create_deployment(prefect.create_flow(some), f"of {pool}", work_pool_name=pool)
+        return prefect.create_flow_run_from_deployment(deployment, state=state).id
+
+    left, held, moved = (made(Pending(name="Submitting")) for _ in range(3))
+    others = [made(None), made(Running()), made(Pending(), "theirs"), held, moved]
+    let_go = alive.hold(alive.PREFECT, str(held), "")
+    unstarted = Unstarted("ours")
+    assert unstarted.end(1e-9) == 0
+    prefect.set_flow_run_state(moved, Pending(), force=True)
+    assert unstarted.end(1e-9) == 1
+    let_go()
+    assert prefect.read_flow_run(left).state.is_crashed()
+    assert prefect.read_flow_run(left).state.message == UNSTARTED
+    assert not any(prefect.read_flow_run(run).state.is_final() for run in others)
 
 
 @pytest.mark.usefixtures("prefect")

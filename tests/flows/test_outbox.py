@@ -23,6 +23,7 @@ from shoal import doctor
 from shoal.cli import main
 from shoal.engines.compare import Comparison
 from shoal.errors import ComputationError, InputError
+from shoal_flows import alive
 from shoal_flows.rerun import rerun
 from shoal_flows.tracking import outbox, record, store
 from shoal_flows.tracking.engines import log_comparison
@@ -91,6 +92,41 @@ def test_an_upload_that_breaks_off_sends_nothing_twice(monkeypatch: pytest.Monke
     (found,) = client.search_runs([experiment])
     assert found.info.run_id == made[0]
     assert found.data.metrics == {"final/x": 1.5}
+
+
+@pytest.mark.usefixtures("silent")
+@pytest.mark.parametrize("end", [None, ValueError("no"), KeyboardInterrupt()])
+def test_whatever_the_end_of_a_study_what_waits_goes_along(
+    end: BaseException | None, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    with suppress(ValueError, KeyboardInterrupt), store.open_run("Forward", "waits") as waits:
+        if end is not None:
+            raise end
+    assert len(outbox.pending()) == 1
+    use(monkeypatch, f"sqlite:///{tmp_path / 'later.db'}")
+    with suppress(ValueError, KeyboardInterrupt), store.open_run("Forward", "next") as run:
+        if end is not None:
+            raise end
+    assert outbox.pending() == []
+    status = {None: "FINISHED", ValueError: "FAILED", KeyboardInterrupt: "KILLED"}[None if end is None else type(end)]
+    for one in (outbox.address(waits.run_id), run.run_id):
+        assert store.connect().get_run(one).info.status == status
+
+
+@pytest.mark.usefixtures("silent")
+def test_parts_of_a_study_that_was_killed_arrive_without_it(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """They wait for a study that runs; where its process is gone, nothing of it will ever come."""
+    let_go = alive.hold(alive.MLFLOW, f"{LOCAL}study", "")
+    with store.open_run("Forward", "part", parent=f"{LOCAL}study") as part:
+        part.metric("final/x", 1.5)
+    use(monkeypatch, f"sqlite:///{tmp_path / 'later.db'}")
+    assert store.upload() == 0
+    let_go()
+    assert store.upload() == 1
+    found = store.connect().get_run(outbox.address(part.run_id))
+    assert found.data.metrics == {"final/x": 1.5}
+    assert "broken_off" in found.data.tags
+    assert "mlflow.parentRunId" not in found.data.tags
 
 
 def damaged(path: Path) -> AbstractContextManager[object]:

@@ -9,6 +9,7 @@ import pytest
 from shoal.errors import InputError
 from shoal_flows import events, settings
 from shoal_flows import ui as of_ui
+from shoal_flows.terminal import following
 from shoal_flows.ui import ui
 
 
@@ -59,3 +60,13 @@ def test_work_is_announced_with_its_end() -> None:
     with events.work("unheard"):
         pass
     assert heard == [("one", "started"), ("one", "done"), ("two", "started"), ("two", "failed")]
+
+
+def test_a_log_file_has_a_line_from_the_first_second(capsys: pytest.CaptureFixture[str]) -> None:
+    """Also while kernels are compiled: the lines of the compilation are passed on as they come."""
+    with following("flow nightly") as listener, events.listening(listener):
+        assert capsys.readouterr().err == "flow nightly: starting\n"
+        with events.work("kernels"):
+            events.note("compiling [2] kernels")
+            assert capsys.readouterr().err == "compiling [2] kernels\n"
+    assert capsys.readouterr().err == "done: kernels\n"

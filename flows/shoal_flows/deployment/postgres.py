@@ -25,6 +25,7 @@ class Postgres:
     """
 
     name = "postgres"
+    needs: Sequence[str] = ()
 
     def __init__(self, folder: Path, port: int) -> None:
         self._data, self._log, self._port = folder / "data", folder / "server.log", port
@@ -39,11 +40,15 @@ class Postgres:
             "PREFECT_SERVER_DATABASE_CONNECTION_URL": f"postgresql+asyncpg://{_ROLE}@127.0.0.1:{self._port}/prefect",
         }
 
-    def start(self) -> None:
+    def begin(self) -> None:
         """Start it and wait until it answers; what a server that was killed left undone is put right first."""
         options = f"-p {self._port} -c listen_addresses=127.0.0.1 -c unix_socket_directories="
         _run("pg_ctl", "start", "-w", "-D", str(self._data), "-l", str(self._log), "-o", options)
         _make_databases(self._port, self._password)
+
+    def is_ready(self) -> bool:
+        """Whether it can do its work: `begin` waits for that."""
+        return not self.ended()
 
     def ended(self) -> bool:
         """Whether its first process is gone."""

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from urllib.error import URLError
 from urllib.request import urlopen
 
+from shoal import ports
 from shoal.errors import InputError
-from shoal.ports import check_free
 
 FOLDER = Path(__file__).parents[3]
 """Where Procfile and prefect.yaml lie: the folder of a checkout."""
@@ -22,21 +21,30 @@ STAGES = (
 """Started in this order and stopped in the reverse one: a worker of Prefect that is told to end together with its
 server waits for it for ever. When all are ready, `deploy` runs to its end."""
 
+NEEDS: Mapping[str, tuple[str, ...]] = {
+    **dict.fromkeys(("mlflow", "prefect"), ("postgres",)),
+    **dict.fromkeys(("worker", "nightly"), ("prefect", "mlflow")),
+    "dask-worker": ("dask-scheduler",),
+}
+"""What has to be ready before one that ended is started again; `postgres` is no line of the Procfile."""
+
 PROFILES: Mapping[str, tuple[str, ...]] = {"nightly": ("nightly",), "scale": ("dask-scheduler", "dask-worker")}
 """What runs only if asked for; the compose file has the same profiles."""
 
 _READY = {
-    "mlflow": ("SHOAL_MLFLOW_PORT", 5000, "/health"),
-    "prefect": ("SHOAL_PREFECT_PORT", 4200, "/api/ready"),
-    "worker": ("SHOAL_WORKER_PORT", 8080, "/health"),
-    "nightly": ("SHOAL_NIGHTLY_PORT", 8081, "/health"),
-    "gauss": ("SHOAL_GAUSS_PORT", 8001, "/ready"),
-    "exudyn": ("SHOAL_EXUDYN_PORT", 8002, "/ready"),
-    "casadi": ("SHOAL_CASADI_PORT", 8003, "/ready"),
-    "dask-scheduler": ("SHOAL_DASK_PAGES_PORT", 8787, "/health"),
-    "dask-worker": ("SHOAL_DASK_WORKER_PORT", 8788, "/health"),
+    "mlflow": (5000, "/health"),
+    "prefect": (4200, "/api/ready"),
+    "worker": (8080, "/health"),
+    "nightly": (8081, "/health"),
+    "gauss": (8001, "/ready"),
+    "exudyn": (8002, "/ready"),
+    "casadi": (8003, "/ready"),
+    "dask-scheduler": (8787, "/health"),
+    "dask-worker": (8788, "/health"),
 }
-"""Setting of the port, its default, and the path that answers when the process is ready."""
+"""Default of the port, which $SHOAL_NAME_PORT chooses, and the path that answers when the process is ready."""
+_PAGES = {"dask-scheduler": "dask-pages"}
+"""Whose port for messages has the setting of its own name."""
 
 
 def chosen(profiles: Sequence[str]) -> list[tuple[str, ...]]:
@@ -49,22 +57,18 @@ def chosen(profiles: Sequence[str]) -> list[tuple[str, ...]]:
 
 def port(name: str) -> int:
     """The port on which a process answers. Raises InputError."""
-    setting, default, _ = _READY[name]
-    text = os.environ.get(setting) or str(default)
-    if not (text.isdigit() and 0 < int(text) < 65536):
-        raise InputError(f"{setting}: {text!r} is not a port between 1 and 65535")
-    return int(text)
+    return ports.port(_PAGES.get(name, name), _READY[name][0])
 
 
 def check_port(name: str) -> None:
     """Raises InputError if a process cannot listen on its port."""
-    check_free("127.0.0.1", port(name), _READY[name][0])
+    ports.check_free("127.0.0.1", port(name), ports.setting_of(_PAGES.get(name, name)))
 
 
 def is_ready(name: str) -> bool:
     """Whether a process answers that it can do its work."""
     try:
-        with urlopen(f"http://127.0.0.1:{port(name)}{_READY[name][2]}", timeout=5) as answer:
+        with urlopen(f"http://127.0.0.1:{port(name)}{_READY[name][1]}", timeout=5) as answer:
             return bool(answer.status == 200)
     except (URLError, OSError):
         return False

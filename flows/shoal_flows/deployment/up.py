@@ -51,7 +51,7 @@ def run(stages: Sequence[Sequence[str]], *, postgres: bool = False) -> None:
         with ExitStack() as stack:
             for database in keeping:
                 stack.callback(database.stop)
-                database.start()
+                database.begin()
             environment = environment_of(keeping[0].stores if keeping else {})
             started = [line for stage in stages for line in _stage(stage, environment, stack, console)]
             if any("worker" in stage for stage in stages):

@@ -15,14 +15,17 @@ from collections.abc import Sequence
 from contextlib import suppress
 from uuid import uuid4
 
-from shoal.errors import ShoalError
+from shoal.errors import ComputationError, ShoalError
 from shoal.shelf import shelf
 
 from shoal_flows import alive, choices, settings
-from shoal_flows.left import end_left
+from shoal_flows.left import Unstarted, end_left
+from shoal_flows.tracking.upload import upload
 
 _GRACE = 4.0
 """Seconds that flows have to end their runs: honcho kills after five. What takes longer is ended at the next start."""
+_EVERY, _STARTS = 30.0, 300.0
+"""Seconds between two looks for runs that no process begins, and that a process has to begin one on a busy machine."""
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -31,6 +34,8 @@ def main(arguments: Sequence[str]) -> int:
         settings.apply()
         if ended := end_left():
             sys.stderr.write(f"worker: {ended} runs that were broken off are ended\n")
+        with suppress(ComputationError):  # else with the next study
+            upload()
         shelf().identity(make=True)
         if different := choices.difference():
             sys.stderr.write(f"worker: {different}, then state the deployments again (make up)\n")
@@ -47,7 +52,7 @@ def main(arguments: Sequence[str]) -> int:
         start_new_session=True,
     )
     try:
-        return process.wait()
+        return _watched(process, Unstarted(_pool(arguments)))
     except KeyboardInterrupt:
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, signal.SIG_IGN)
@@ -55,6 +60,19 @@ def main(arguments: Sequence[str]) -> int:
         process.terminate()
         process.wait()
         return 0
+
+
+def _watched(process: subprocess.Popen[bytes], unstarted: Unstarted) -> int:
+    """Wait for the worker; now and then end the runs that it could not start. Returns its exit status."""
+    while True:
+        with suppress(subprocess.TimeoutExpired):
+            return process.wait(_EVERY)
+        if ended := unstarted.end(_STARTS):
+            sys.stderr.write(f"worker: {ended} runs that no process began are ended\n")
+
+
+def _pool(arguments: Sequence[str]) -> str:
+    return arguments[arguments.index("--pool") + 1] if "--pool" in arguments else "default"
 
 
 def _end_flows(worker: str) -> None:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from shoal.home import home
 
+from shoal_flows import alive
 from shoal_flows.tracking.record import LOCAL, Run
 
 _IDS = "ids.json"
@@ -50,7 +51,9 @@ def _upload(where: Path, make: Callable[[Run], None], send: Callable[[Run], None
     # A run that was made before the last try broke off is gone on with.
     run.run_id = given.get(kept_as, kept_as)
     if run.parent and run.parent.startswith(LOCAL):
-        return 0  # of a study that has not ended
+        if alive.is_held(alive.MLFLOW, run.parent):
+            return 0  # of a study that has not ended
+        run.parent, run.tags["broken_off"] = None, "the study that this run is a part of was killed before it was kept"
     if not run.known:
         make(run)
         _remember(kept_as, run.run_id)

@@ -6,7 +6,7 @@ import logging
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -68,21 +68,24 @@ def open_run(
         run.files |= call
     if not _waits(run):
         _attempt(_make, run)
-    with alive.held(alive.MLFLOW, run.run_id, _address()) if run.known else nullcontext():
-        try:
-            yield run
-        except BaseException as error:
-            if isinstance(error, Exception):
-                run.judge("refused" if isinstance(error, InputError) else "failed", [str(error)], "No answer")
-            run.end("FAILED" if isinstance(error, Exception) else "KILLED")
-            _deliver(run)
-            raise
-        run.end("FINISHED")
-        _deliver(run)
-    if parent is None and not _is_silent():
-        # MLflow answers: what an earlier study could not tell it goes along.
-        with suppress(ComputationError):
-            upload()
+    try:
+        with alive.held(alive.MLFLOW, run.run_id, _address()):
+            try:
+                yield run
+            except BaseException as error:
+                if isinstance(error, Exception):
+                    run.judge("refused" if isinstance(error, InputError) else "failed", [str(error)], "No answer")
+                run.end("FAILED" if isinstance(error, Exception) else "KILLED")
+                raise
+            else:
+                run.end("FINISHED")
+            finally:
+                _deliver(run)
+    finally:
+        if parent is None and not _is_silent():
+            # MLflow answers: what this or an earlier study could not send goes along, however this one ended.
+            with suppress(ComputationError):
+                upload()
 
 
 @contextmanager

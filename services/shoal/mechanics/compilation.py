@@ -21,6 +21,7 @@ from numba import types
 from numba.core import caching, config, dispatcher, event
 from numba.core.compiler_lock import global_compiler_lock
 
+from shoal.errors import FULL, ComputationError
 from shoal.mechanics import clock, linking
 from shoal.mechanics.notes import tell
 
@@ -116,12 +117,18 @@ _numbas_save = caching.Cache.save_overload
 def _compile(self: Any, sig: Any) -> Any:
     """`Dispatcher.compile`: looks into the cache, compiles, saves. Kernels wait for those they call: in no circle.
 
-    No time limit counts it.
+    No time limit counts it. Raises ComputationError where there is no room for the machine code.
     """
     whole = isinstance(self._cache, caching.NullCache)
     name = f"{self.py_func.__module__}.{self.py_func.__qualname__} {sig}"
     with clock.stopped(), global_compiler_lock if whole else _alone(name), linking.level(self, sig):
-        return _numbas_compile(self, sig)
+        try:
+            return _numbas_compile(self, sig)
+        except OSError as error:
+            if error.errno not in FULL:
+                raise
+            text = f"compiled kernels cannot be kept in {config.CACHE_DIR}: {error.strerror}; make room there"
+            raise ComputationError(f"{text}, or set SHOAL_HOME or NUMBA_CACHE_DIR to another folder") from None
 
 
 def _save(self: Any, sig: Any, data: Any) -> None:

@@ -87,7 +87,8 @@ def warm_for(scenes: Iterable[Scene], lanes: Iterable[int], note: Note) -> None:
                 wanted[mark] = kernels(scene, count)
     ahead(itertools.chain(*wanted.values()), note)
     for mark in wanted:
-        mark.touch()
+        with suppress(OSError):  # the next run looks again
+            mark.touch()
 
 
 def _likeness(scene: Scene, lanes: int) -> str:
@@ -102,7 +103,7 @@ def _likeness(scene: Scene, lanes: int) -> str:
 def ahead(wanted: Iterable[Kernel], note: Note) -> None:
     """Compile what is missing in the cache, longest first, in as many processes as there are cores.
 
-    Where there can be no processes, nothing is done but to say so.
+    Where there can be no processes, as in a worker of Dask, which is a daemon, nothing is done but to say so.
     """
     begin = time.perf_counter()
     missing = sorted((one for one in dict.fromkeys(wanted) if not one.cached), key=lambda one: -one.seconds)
@@ -114,6 +115,8 @@ def ahead(wanted: Iterable[Kernel], note: Note) -> None:
     what = f"compiling {len(missing)} kernels for this machine, once"
     note(f"{what}: about {wait:.0f} s on {cores}, which time limits do not count")
     try:
+        if multiprocessing.current_process().daemon:
+            raise NotImplementedError("a daemon may start none")
         with clock.stopped(), ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as pool:
             for number, done in enumerate(as_completed([pool.submit(_compile, one) for one in missing]), 1):
                 note(f"  {done.result()} ({number} of {len(missing)}, {time.perf_counter() - begin:.0f} s so far)")
@@ -162,4 +165,7 @@ def _pendulum(integrator: str) -> Scene:
 if __name__ == "__main__":
     from shoal.mechanics import warm as itself  # the processes know its kernels by this name, not as __main__
 
-    itself.warm(note=lambda line: print(line, file=sys.stderr, flush=True))  # noqa: T201 - a command
+    try:
+        itself.warm(note=lambda line: print(line, file=sys.stderr, flush=True))  # noqa: T201 - a command
+    except ShoalError as error:
+        sys.exit(f"shoal: {error}")
