@@ -7,10 +7,11 @@ import os
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from functools import cache
-from multiprocessing import active_children, get_all_start_methods, get_context, parent_process
-from threading import Event, Thread
+from multiprocessing import active_children, get_all_start_methods, get_context
+from threading import Event
 from typing import ParamSpec, Protocol, TypeVar
 
+from shoal.children import end_with_parent
 from shoal.errors import check_trusted
 
 from shoal_flows import cluster
@@ -88,18 +89,6 @@ def _pool() -> ProcessPoolExecutor:
     context = get_context(method)
     if method == "forkserver":
         context.set_forkserver_preload(["shoal_flows.preload"])
-    pool = ProcessPoolExecutor(count(), mp_context=context, initializer=_end_with_parent)
+    pool = ProcessPoolExecutor(count(), mp_context=context, initializer=end_with_parent)
     atexit.register(pool.shutdown, wait=False, cancel_futures=True)
     return pool
-
-
-def _end_with_parent() -> None:
-    """Let this process end when the one that asked for it does, even if that is killed; workers would wait for ever."""
-    Thread(target=_wait_for_end, daemon=True).start()
-
-
-def _wait_for_end() -> None:
-    parent = parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)

@@ -79,7 +79,7 @@ def test_it_stands_still_while_other_processes_compile(at: list[float], monkeypa
     """What a command says a search took is not the minute in which its kernels were compiled."""
 
     class Pool(ThreadPoolExecutor):
-        def __init__(self, workers: int, _context: object) -> None:
+        def __init__(self, workers: int, *_: object) -> None:
             super().__init__(workers)
 
     def compiles(kernel: warm.Kernel) -> str:

@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import config
 
+from shoal.children import end_with_parent
 from shoal.errors import ShoalError
 from shoal.mechanics import clock, gates
 from shoal.mechanics.assembly.build import build
@@ -117,7 +118,8 @@ def ahead(wanted: Iterable[Kernel], note: Note) -> None:
     try:
         if multiprocessing.current_process().daemon:
             raise NotImplementedError("a daemon may start none")
-        with clock.stopped(), ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as pool:
+        pool = ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), end_with_parent)
+        with clock.stopped(), pool:
             for number, done in enumerate(as_completed([pool.submit(_compile, one) for one in missing]), 1):
                 note(f"  {done.result()} ({number} of {len(missing)}, {time.perf_counter() - begin:.0f} s so far)")
     except (OSError, NotImplementedError, BrokenProcessPool) as error:
