@@ -174,6 +174,7 @@ def check(page: str, folder: Path, *, night: bool) -> None:
     environment = newcomer(folder)
     work = folder / "work"
     work.mkdir()
+    (work / ".venv").symlink_to(sys.prefix)
     needed = [engine for engine, place in SERVICES.items() if place in text]
     with serving(environment, needed) as places:
         session = Session(work, environment, places)
@@ -184,18 +185,22 @@ def check(page: str, folder: Path, *, night: bool) -> None:
             session.close()
 
 
+BY_DAY = ("docs/notebook.md", "docs/tutorial.md")
+"""Pages that test_docs.py runs by day in its own process, which is quicker, with the figures that they state."""
+
+
 def having(when: str) -> list[str]:
     """Pages with blocks that are run then."""
     return [page for page in PAGES if any(b.language in RUN and b.when == when for b in blocks(page))]
 
 
-@pytest.mark.parametrize("page", having(""))
+@pytest.mark.parametrize("page", [page for page in having("") if page not in BY_DAY])
 def test_a_page_by_day(page: str, tmp_path: Path) -> None:
     check(page, tmp_path, night=False)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("page", having("Tested at night"))
+@pytest.mark.parametrize("page", [*BY_DAY, *having("Tested at night")])
 def test_a_page_at_night(page: str, tmp_path: Path) -> None:
     check(page, tmp_path, night=True)
 
