@@ -29,7 +29,7 @@ ALL = ["README.md", *sorted(path.relative_to(ROOT).as_posix() for path in (ROOT 
 PAGES = [page for page in ALL if not page.startswith("docs/extend/")]
 FENCE = re.compile(r"^(?P<indent> *)(?P<mark>```+)(?P<info>[^\n]*)\n(?P<code>.*?)^(?P=indent)(?P=mark) *$", re.M | re.S)
 TITLE = re.compile(r'title="(Not tested|Tested at night): [^"]{5,}"')
-RUN, SHOWN = ("bash", "python"), ("text", "yaml", "json", "diff")
+RUN, SHOWN = ("bash", "python"), ("text", "yaml", "json", "diff", "nginx")
 SERVICES = {"gauss": "http://127.0.0.1:8001", "exudyn": "http://127.0.0.1:8002"}
 """Engines that pages expect to be served, and where they say so."""
 PYTHON = """
