@@ -366,3 +366,48 @@ def test_a_budget_is_never_smaller_than_its_largest_part() -> None:
         green = budget.grade(True, size) == "good"
         assert green == (bool(numbers) and not budget.unknown and sum(numbers) <= GOOD * size)
         assert budget.grade(False, size) == "bad"
+
+
+def coarse_pendulum(rng: np.random.Generator) -> Scene:
+    """A flexible rod of one or two elements."""
+    rod = {"kind": "rod", "length": rng.uniform(1.0, 2.0), "height": rng.uniform(0.01, 0.03), "width": 0.04}
+    rod |= {"density": 5540.0, "youngs_modulus": 10 ** rng.uniform(7.3, 8.3), "element": "ancf-cable"}
+    return Scene.parse(
+        {
+            "name": "coarse-pendulum",
+            "bodies": {"r": rod | {"elements": int(rng.integers(1, 3))}},
+            "joints": {"O": {"first": {"body": "ground", "point": [0, 0]}, "second": {"body": "r", "point": "start"}}},
+            "markers": {"e": {"body": "r", "point": "end"}},
+            "initial": {"r": {"angle": rng.uniform(-0.5, 1.0)}},
+            "solver": {"duration": rng.uniform(0.3, 0.7), "step": 2e-4},
+        }
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(8))
+def test_no_limit_is_called_kept_that_the_converged_beam_passes(seed: int) -> None:
+    """Limits near what Exudyn's cables reach on sixteen elements, from both ends and the middle of an interval."""
+    rng = np.random.default_rng(100 + seed)
+    scene = coarse_pendulum(rng)
+    begin, half = scene.start("r").angle, rng.uniform(0.002, 0.02)
+    fine = {"bodies.r.elements": 16, "solver.step": 2e-4}
+    ends = [
+        shoal.simulate(scene, values=fine | {"initial.r.angle": at}, engine="exudyn", verify=False).marker("e")[-1]
+        for at in (begin - half, begin, begin + half)
+    ]
+    true = np.array(ends)
+    limits, beyond = list[str](), list[float]()
+    for k, axis in enumerate("xy"):
+        for away in rng.normal(0.0, 1.0, 3) * rng.choice([0.1, 1.0, 10.0]) * np.ptp(true[:, k]):
+            limits.append(f"e.{axis} > {float(true[:, k].max() + away)!r}")
+            beyond.append(-float(away))
+    when = [scene.solver.duration]
+    found = shoal.uncertain(scene, {"initial.r.angle": (begin - half, begin + half)}, when, limits=limits)
+    assert found.bounds is not None
+    for k, axis in enumerate("xy"):
+        low, high = (found.column("e", axis, of)[-1] for of in (found.bounds.lower_outer, found.bounds.upper_outer))
+        assert low < true[:, k].min() <= true[:, k].max() < high
+    for one, far in zip(found.limits, beyond, strict=True):
+        assert not (one.kept and far > 0.0), (one.limit.text, far, one.errors)
+        assert one.kept is not False or far > -0.2 * np.ptp(true), (one.limit.text, far, one.errors)
