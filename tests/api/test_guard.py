@@ -135,6 +135,25 @@ def test_fetch_metadata(site: str, mode: str, dest: str, method: str) -> None:
     assert asked({"type": "http", "method": method}, headers) == (200 if ours else 403)
 
 
+@pytest.mark.parametrize(("path", "found"), [("/a/b", 404), ("/a/b/c", 404), ("/a/bc", 200), ("/a", 200)])
+def test_parts_that_are_not_served(path: str, found: int) -> None:
+    assert asked({"type": "http", "path": path}, [("Host", "localhost")], off=["/a/b"]) == found
+
+
+def test_headers_are_set_once() -> None:
+    said: list[Any] = []
+
+    async def program(scope: Any, receive: Any, send: Any) -> None:
+        await send({"type": "http.response.start", "status": 200, "headers": [(b"X-A", b"theirs"), (b"b", b"c")]})
+
+    async def send(message: Any) -> None:
+        said.append(message)
+
+    scope = {"type": "http", "method": "GET", "path": "/", "scheme": "http", "headers": [(b"host", b"localhost")]}
+    asyncio.run(Guard(program, OWN, headers={"X-a": "ours"})(scope, send, send))  # type: ignore[arg-type]
+    assert said[0]["headers"] == [(b"b", b"c"), (b"x-a", b"ours")]
+
+
 def test_the_setting(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SHOAL_ALLOWED_HOSTS", " Shoal.Example.org, *.a.b ,,fd00::1")
     assert allowed_hosts("192.0.2.7") == (*LOOPBACK, "192.0.2.7", "shoal.example.org", "*.a.b", "[fd00::1]")

@@ -257,7 +257,6 @@ def test_nothing_leaves_the_machine_and_neither_banner_nor_bubble_is_seen(desk: 
         status = page.evaluate("async () => (await fetch('/ajax-api/3.0/mlflow/assistant/config')).status")
         assert status == 404
     for path in ("/docs", "/redoc", "/api/docs", "/api/redoc"):
-        # Their scripts are elsewhere.
         page.goto(desk.at["PREFECT"] + path)
         page.wait_for_timeout(500)
     blocked = page.evaluate("() => fetch('http://localhost:9/').then(() => 'sent', (error) => String(error))")

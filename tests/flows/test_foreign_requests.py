@@ -106,6 +106,8 @@ def test_prefect_asks_for_a_token_and_offers_one_set_of_pages(at: Mapping[str, s
     assert status(f"{at['PREFECT']}/api/flows/filter", "POST", Content_Type="application/json") == 403
     assert call(f"{at['PREFECT']}/api/flows/filter", {})
     assert call(f"{at['PREFECT']}/ui-settings")["available_uis"] == ["v1"]
+    for path in ("/docs", "/redoc", "/api/docs", "/api/redoc"):
+        assert status(at["PREFECT"] + path) == 404  # their scripts are elsewhere
     with urlopen(at["PREFECT"]) as answer:
         policy = answer.headers["Content-Security-Policy"]
     assert {"default-src 'self'", "frame-ancestors 'self'"} <= set(policy.split("; "))

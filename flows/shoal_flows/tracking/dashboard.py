@@ -13,7 +13,7 @@ import json
 import os
 from typing import Any
 
-from shoal.api.guard import Guard, Receive, Scope, Send, allowed_hosts
+from shoal.api.guard import Guard, allowed_hosts
 
 _HOSTS = allowed_hosts()
 os.environ.setdefault(
@@ -29,9 +29,9 @@ from mlflow.server.fastapi_app import app as mlflow  # noqa: E402
 
 _OFF = (
     "/ajax-api/3.0/mlflow/assistant",
-    "/gateway/",
-    "/ajax-api/2.0/mlflow/gateway-proxy",
     "/ajax-api/3.0/mlflow/gateway",
+    "/ajax-api/2.0/mlflow/gateway-proxy",
+    "/gateway",
 )
 """Paths that lead to language models, and to commands on this machine by their means."""
 _POLICY = "; ".join(
@@ -72,19 +72,11 @@ def _told(response: Any) -> Any:
     return response
 
 
-async def _without_assistant(scope: Scope, receive: Receive, send: Send) -> None:
-    """Answer as if MLflow had neither an assistant nor a gateway."""
-    if scope["type"] == "http" and scope["path"].startswith(_OFF):
-        await send({"type": "http.response.start", "status": 404, "headers": [(b"content-type", b"application/json")]})
-        await send({"type": "http.response.body", "body": b'{"detail": "Shoal serves no language model"}'})
-    else:
-        await mlflow(scope, receive, send)
-
-
 app = Guard(
-    _without_assistant,
+    mlflow,
     _HOSTS,
     [origin for origin in os.environ.get("MLFLOW_SERVER_CORS_ALLOWED_ORIGINS", "").split(",") if origin],
     {"Content-Security-Policy": _POLICY, "Referrer-Policy": "same-origin"},
+    _OFF,
 )
 __all__ = ["app"]

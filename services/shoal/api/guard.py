@@ -122,6 +122,7 @@ class Guard:
         application: the program behind it
         hosts, origins: see RequestPolicy
         headers: response headers that are set in every answer, such as a content security policy
+        off: paths of the program that are not served, with all below them
     """
 
     def __init__(
@@ -130,21 +131,27 @@ class Guard:
         hosts: Sequence[str],
         origins: Iterable[str] = (),
         headers: Mapping[str, str] | None = None,
+        off: Sequence[str] = (),
     ) -> None:
-        self.application, self.policy = application, RequestPolicy(hosts, origins)
+        self.application, self.policy, self.off = application, RequestPolicy(hosts, origins), tuple(off)
         self._headers = [(name.lower().encode(), value.encode()) for name, value in (headers or {}).items()]
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass a request on, or refuse it."""
         if scope["type"] not in ("http", "websocket"):
             return await self.application(scope, receive, send)
-        refusal = self.policy.refusal(scope)
+        refusal = self.policy.refusal(scope) or self._not_served(scope["path"])
         if refusal is None:
             return await self.application(scope, receive, self._with_headers(send) if self._headers else send)
         if scope["type"] == "websocket":
             await receive()
             return await send({"type": "websocket.close", "code": 1008, "reason": refusal.text[:100]})
         return await problem_response(refusal)(scope, receive, send)
+
+    def _not_served(self, path: str) -> Refusal | None:
+        if any(path == one or path.startswith(f"{one}/") for one in self.off):
+            return Refusal("not-found", "this part of the program is not served here")
+        return None
 
     def _with_headers(self, send: Send) -> Send:
         async def sending(message: Message) -> None:
