@@ -149,6 +149,7 @@ def conclude(
         residual_autocorrelation=correlation,
         residual_tests=near.tests,
         suspects=judgement.suspects,
+        hypotheses=judgement.hypotheses,
         profiles=known.profiled,
         bootstrap=bootstrap(model, point, near.predicted, correlation, draws, rng) if draws else None,
         posterior=drawn,
@@ -221,9 +222,8 @@ def _known(model: ForwardModel, outcome: Outcome, near: Evidence, profiles_too: 
 def _judged(model: ForwardModel, near: Evidence, known: _Known) -> Judgement:
     """The verdict; a failure where the answer cannot be simulated."""
     if near.possible:
-        given = near.seen, near.at, near.tests, known.values, known.combinations
         late = Judgement(Verdict.FAILED, "no time was left to judge the answer", ["allow more time"])
-        return unless_late(lambda: judge(model, known.outcome, *given), late)
+        return unless_late(lambda: judge(model, known.outcome, near, known.values, known.combinations), late)
     why = f" ({model.failure})" if model.failure else ""
     return Judgement(Verdict.FAILED, f"no parameter set could be simulated{why}; look at starts, bounds and the scene")
 

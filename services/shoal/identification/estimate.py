@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from shoal.errors import InputError
 from shoal.identification.dataset import dataset
+from shoal.identification.judge.hypotheses import Hypothesis
 from shoal.identification.judge.residual_tests import ResidualTests
 from shoal.identification.judge.suspects import Suspect
 from shoal.identification.judge.verdict import Verdict
@@ -31,7 +32,8 @@ class Estimate:
     history: evaluations and the best fitness after them; iterations: (iteration, best, mean fitness)
     evaluations: simulations; work: simulated time over that of one run of all recordings
     choice: which method was taken, and why; notes: what was found and mended in the recordings
-    advice: what to do next; suspects: properties of the measurement that would explain the misfit
+    advice: what to do next; suspects: what was taken as known and would explain a misfit if it were freed
+    hypotheses: score tests of all that was taken as known, the most significant first
     minima: others that were found, by their parameters, the best first
     sensitivity_doubt: relative difference of derivatives by two step sizes
     profiles, bootstrap, posterior: where wished for
@@ -81,6 +83,7 @@ class Estimate:
     values: dict[str, float] = field(default_factory=dict)
     left_out: dict[str, str] = field(default_factory=dict)
     prediction: list[Prediction] = field(default_factory=list)
+    hypotheses: list[Hypothesis] = field(default_factory=list)
     joint: dict[str, Any] = field(default_factory=dict)
 
     @property
@@ -152,6 +155,7 @@ class Estimate:
             "residual_autocorrelation": plain(self.residual_autocorrelation),
             "residual_tests": self.residual_tests.to_json(),
             "suspects": [plain(vars(suspect)) for suspect in self.suspects],
+            "hypotheses": [plain(vars(one)) for one in self.hypotheses],
             "profiles": {name: found.to_json() for name, found in self.profiles.items()},
             "bootstrap": None if self.bootstrap is None else self.bootstrap.to_json(),
             "posterior": None if self.posterior is None else self.posterior.to_json(),

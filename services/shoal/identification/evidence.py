@@ -9,13 +9,14 @@ import numpy as np
 
 from shoal.identification.deadline import unless_late
 from shoal.identification.forward import ForwardModel
+from shoal.identification.judge.hypotheses import ScoreTest
 from shoal.identification.judge.residual_tests import ResidualTests, residual_tests
 from shoal.identification.spread.covariance import Block, blocks_of
 from shoal.identification.spread.given import Given
 from shoal.identification.spread.model_error import Corrections, ModelError, model_error, rms_of
 from shoal.identification.spread.sensitivity import Sensitivity, believed
 from shoal.identification.spread.taken_as_given import taken_as_given
-from shoal.identification.spread.uncertainty import Linearisation, linearise
+from shoal.identification.spread.uncertainty import Linearisation, followed, linearise
 from shoal.trajectory import Array
 
 
@@ -55,6 +56,17 @@ class Evidence:
     def known(self) -> bool:
         """Whether intervals can be told."""
         return self.possible and self.looked
+
+    def score_test(self, model: ForwardModel) -> ScoreTest:
+        """Return what tests hypotheses at the point of a model."""
+        seen, refined = self.seen, self.error.refined(self.seen.residual, self.seen.jacobian, self.at.pseudo_inverse)
+        rows = np.ones(len(seen.residual), dtype=bool)
+        if seen.end is not None:
+            rows[: len(model.rows.time)] = model.rows.time <= seen.end + 1e-12
+        given = [one for one in (*self.given, self.fields) if one is not None]
+        residual = seen.residual if refined is None else refined
+        noise, stated = self.at.alone.noise, model.rows.noise is not None
+        return ScoreTest(residual, followed(seen.jacobian)[0], self.blocks, noise, given, stated, rows)
 
     @property
     def correction(self) -> Corrections:

@@ -9,8 +9,10 @@ from enum import StrEnum
 import numpy as np
 
 from shoal.identification.deadline import TimeIsUp, unless_late
+from shoal.identification.evidence import Evidence
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.exchanged import exchanged
+from shoal.identification.judge.hypotheses import Hypothesis
 from shoal.identification.judge.odd_one import odd_one
 from shoal.identification.judge.residual_tests import ResidualTests, residual_tests
 from shoal.identification.judge.rivals import ALIAS, relation, rivals_of, within
@@ -23,7 +25,7 @@ from shoal.identification.methods.outcome import Outcome
 from shoal.identification.spread.covariance import blocks_of
 from shoal.identification.spread.intervals import Refit, few, with_refits
 from shoal.identification.spread.sensitivity import Sensitivity
-from shoal.identification.spread.uncertainty import Linearisation, linearise
+from shoal.identification.spread.uncertainty import linearise
 from shoal.identification.spread.value import Value
 from shoal.trajectory import Array
 
@@ -60,6 +62,7 @@ class Judgement:
     """The verdict, why, what to do next, and what would explain a misfit.
 
     refits: fits with what would explain a misfit that is not held against the model; the intervals hold them too
+    hypotheses: the score tests of what was taken as known, the most significant first
     better: a minimum that fits better, if the search for suspects met one: go on from there
     """
 
@@ -69,18 +72,18 @@ class Judgement:
     suspects: list[Suspect] = field(default_factory=list)
     refits: list[Refit] = field(default_factory=list)
     better: Descent | None = None
+    hypotheses: list[Hypothesis] = field(default_factory=list)
 
 
 def judge(
     model: ForwardModel,
     outcome: Outcome,
-    seen: Sensitivity,
-    at: Linearisation,
-    tests: ResidualTests,
+    near: Evidence,
     parameters: dict[str, Value],
     unknown: list[str],
 ) -> Judgement:
     """The verdict on an outcome: failures first, then the minimum, the model, rivals, and what is identifiable."""
+    seen, at, tests = near.seen, near.at, near.tests
     if not outcome.ended:
         advice = ["allow more time, or start from a better place"]
         return Judgement(Verdict.FAILED, outcome.message or "the method did not come to its end", advice)
@@ -95,10 +98,26 @@ def judge(
         reason = f"{cause}: the model fits the first {seen.end:.3g} s; beyond, where "
         reason += f"the misfit is that makes {tests.sized(tests.size)} of all, nothing tells whether this is a minimum"
         return Judgement(Verdict.UNFINISHED, reason, [remedy])
-    looked = Findings()
-    misfitting = (tests.limited or tests.wrong_model) and tests.size > _NEGLIGIBLE * tests.signal
-    if misfitting:
-        looked = suspects(model, outcome.point, seen.residual, seen.jacobian, tests.explained)
+    looked, seen_well = Findings(), tests.size > _NEGLIGIBLE * tests.signal
+    misfitting = (tests.limited or tests.wrong_model) and seen_well
+    if seen_well:
+        at_answer = outcome.point, seen.residual, seen.jacobian, tests.explained
+        looked = suspects(model, *at_answer, test=near.score_test(model), misfit=misfitting)
+    judged = _by_findings(model, outcome, near, parameters, unknown, looked, misfitting)
+    return replace(judged, hypotheses=looked.hypotheses)
+
+
+def _by_findings(
+    model: ForwardModel,
+    outcome: Outcome,
+    near: Evidence,
+    parameters: dict[str, Value],
+    unknown: list[str],
+    looked: Findings,
+    misfitting: bool,
+) -> Judgement:
+    """The verdict on a minimum, by what was found of the things taken as known."""
+    seen, at, tests = near.seen, near.at, near.tests
     if looked.better is not None:
         reason = f"a better minimum was met, of fitness {looked.better.fitness:.3g} instead of {outcome.fitness:.3g}"
         advice = ["look for another minimum (--method multi-start)"]
@@ -110,7 +129,9 @@ def judge(
         odd = unless_late(lambda: odd_stretch(model, outcome.point), odd)
     if tests.wrong_model or (found and found[0].before >= _DECISIVE * found[0].after):
         return _rejected(model, outcome, seen, tests, found, odd)
-    if looked.cut:
+    if found and not misfitting and (moved := _moved(parameters, looked.refits)):
+        return _refuted(tests, looked, moved)
+    if looked.cut and misfitting:
         reason = f"no time was left to see what a misfit of {tests.sized(tests.size)} is due to"
         return Judgement(Verdict.FAILED, reason, ["allow more time"], found)
     if not outcome.converged:
@@ -127,6 +148,21 @@ def judge(
         return Judgement(Verdict.AMBIGUOUS, message, advice, found)
     judged = _identifiable(model, seen, tests, with_refits(parameters, looked.refits), unknown, found, odd)
     return replace(judged, refits=looked.refits)
+
+
+def _moved(parameters: Mapping[str, Value], refits: list[Refit]) -> list[str]:
+    """Parameters that a fit with something freed takes out of their intervals."""
+    ends = [refit.values() for refit in refits]
+    return [n for n, known in parameters.items() if any(not known.lower <= e[n].value <= known.upper for e in ends)]
+
+
+def _refuted(tests: ResidualTests, looked: Findings, moved: list[str]) -> Judgement:
+    """The rejection of a model that fits no worse than noise, but significantly worse than with something freed."""
+    cause, advice = _named(looked.suspects, tests.rows)
+    best = looked.hypotheses[0]
+    reason = f"the data contradict what is taken as known: {cause}"
+    reason += f" (score tests of {len(looked.hypotheses)} hypotheses: p = {best.corrected:.1g}) and move"
+    return Judgement(Verdict.REJECTED, f"{reason} {', '.join(moved)}", advice, looked.suspects)
 
 
 def _unfinished(model: ForwardModel, point: Array, seen: Sensitivity) -> str:
@@ -165,14 +201,8 @@ def _rejected(
     reason = f"the best fit is off by {tests.sized(tests.size)}, {_against(tests)}"
     advice = []
     if found:
-        reason += f"; {found[0]}"
-        # A clock and gravity, for instance, have the same effect on a free swing.
-        best, *equals = (suspect.words for suspect in found if suspect.equals(found[0], tests.rows))
-        reason += f" (as would {', '.join(equals)})" if equals else ""
-        others = [suspect.words for suspect in found if suspect.words not in (best, *equals)][:_OTHERS]
-        seek = "" if found[0].kind == "data" else ", or seek it as a parameter"
-        advice.append(f"check the {' or the '.join([best, *equals])}{seek}")
-        advice += [f"less likely: the {' or the '.join(others)}"] if others else []
+        cause, advice = _named(found, tests.rows)
+        reason += f"; {cause}"
     for name, off in _against_priors(model, seen.residual):
         reason += f"; {name} is {off:.2g} standard deviations off its prior"
         advice.insert(0, f"check the prior of {name}")
@@ -187,6 +217,17 @@ def _rejected(
     if not found and not said:
         advice.append("check lengths, masses and friction of the model, and which bodies bend")
     return Judgement(Verdict.REJECTED, reason, advice, found)
+
+
+def _named(found: list[Suspect], rows: int) -> tuple[str, list[str]]:
+    """The best suspect with its equals, and what to do about them, in words."""
+    # A clock and gravity, for instance, have the same effect on a free swing.
+    best, *equals = (suspect.words for suspect in found if suspect.equals(found[0], rows))
+    cause = f"{found[0]} (as would {', '.join(equals)})" if equals else str(found[0])
+    others = [suspect.words for suspect in found if suspect.words not in (best, *equals)][:_OTHERS]
+    seek = {"data": "", "bounds": ": widen its bounds"}.get(found[0].kind, ", or seek it as a parameter")
+    advice = [f"check the {' or the '.join([best, *equals])}{seek}"]
+    return cause, advice + ([f"less likely: the {' or the '.join(others)}"] if others else [])
 
 
 def _against_priors(model: ForwardModel, residual: Array) -> list[tuple[str, float]]:
@@ -247,6 +288,8 @@ def _identifiable(
         notes += [f"{found[0]}; the intervals hold the answer with it too"] if found else []
         notes += [said for said in odd[:1] if said]
         advice += [do for do in odd[1:] if do]
+    elif found:
+        notes.append(f"{found[0]}; the intervals hold the answer with it too")
     elif tests.too_large:
         notes.append(f"the noise is {tests.ratio:.3g} times what was stated; the intervals go by what was found")
     if tests.unresolved:

@@ -16,6 +16,8 @@ _ROUND_OFF = 1e-12
 """Of the largest singular value: a smaller one is round-off, whatever the derivatives say."""
 _UNTRIED = 1e-6
 """Likewise of derivatives by a single step, whose error is not known."""
+_FOLLOWED = 1e-8
+"""Likewise of directions that a test takes for followed."""
 LEVEL = 0.95
 """Of the intervals."""
 ABSORBED = 4.0
@@ -85,6 +87,16 @@ def inverse(jacobian: Array, scale: Array, error: Array | None = None) -> tuple[
     known = told(singular, right, None if error is None else error * scale)
     over = np.where(known, 1.0 / np.where(known, singular, 1.0), 0.0)
     return scale[:, None] * (right.T * over) @ left.T, left[:, known], right[~known].T
+
+
+def followed(jacobian: Array) -> tuple[Array, Array]:
+    """Orthonormal columns (m, k) of all that the parameters change by a Jacobian (m, p), and its pseudo-inverse (p, m).
+
+    Weak directions count too: a test is to find only what no change of the parameters can do.
+    """
+    left, singular, right = np.linalg.svd(jacobian, full_matrices=False)
+    seen = singular > _FOLLOWED * max(float(singular[0]), 1e-300)
+    return left[:, seen], (right[seen].T / singular[seen]) @ left[:, seen].T
 
 
 def linearise(

@@ -8,7 +8,7 @@ import numpy as np
 
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.suspects.candidate import Candidate
-from shoal.identification.problem import RESERVED
+from shoal.identification.problem import RESERVED, Parameter
 from shoal.identification.recording.measurement import Recording
 
 _FACTORS = 2.0
@@ -16,6 +16,8 @@ _FACTORS = 2.0
 _LATE = 0.2
 _EARLY = 0.5
 """Of the record: how much may be missing after the release, and how long the machine may be held before it."""
+_SHORTEST, _HOLDS = 0.005, 9
+"""Of the record, the shortest hold that is tried, and how many up to the longest."""
 _STEP = 1e-4
 _MOST = 6
 """Recordings that have candidates of their own."""
@@ -66,8 +68,15 @@ def _of(runs: list[Recording], name: str | None = None) -> Iterator[Candidate]:
         stated = float(getattr(first.stated, field))
         bounds, probe = (stated - width, stated + width), stated + _STEP * width
         yield Candidate.single(field + of, f"{RESERVED}.{field}", stated, bounds, probe, "measurement", own=own)
-    stated = first.stated.delay
+    yield _delay(f"delay{of}", first.stated.delay, end, own)
+
+
+def _delay(name: str, stated: float, end: float, own: tuple[str, ...]) -> Candidate:
+    """Late after the release, or held before it. Of a short hold the parameters follow all but a kink, which no
+    derivative shows: several holds are tried."""
     bounds = (stated - _EARLY * end, stated + _LATE * end)
-    yield Candidate.single(
-        f"delay{of}", f"{RESERVED}.delay", stated, bounds, stated + _STEP * end, "measurement", own=own
-    )
+    free = Parameter(path=f"{RESERVED}.delay", lower=bounds[0], upper=bounds[1], scale="linear", own=own or False)
+    held = end * np.geomspace(_SHORTEST, _EARLY, _HOLDS)
+    probes = np.append(stated + _STEP * end, stated - held).reshape(-1, 1, 1)
+    bases = np.full((len(probes), 1), stated)
+    return Candidate(name, "measurement", (free,), (stated,), probes, bases)

@@ -16,20 +16,27 @@ import numpy as np
 
 from shoal.identification.deadline import TimeIsUp
 from shoal.identification.forward import ForwardModel
+from shoal.identification.judge.hypotheses import Hypothesis, ScoreTest, table
 from shoal.identification.judge.suspects.bending import bending
 from shoal.identification.judge.suspects.candidate import Candidate
 from shoal.identification.judge.suspects.fits import Together, groups_of
+from shoal.identification.judge.suspects.of_bounds import at_bound, told, without_bounds
 from shoal.identification.judge.suspects.of_data import Reading, misfit, of_data
 from shoal.identification.judge.suspects.of_machine import of_machine
 from shoal.identification.judge.suspects.of_measurement import of_measurement
 from shoal.identification.judge.suspects.shaken import shaken
-from shoal.identification.judge.suspects.suspect import Suspect, explains, penalty
+from shoal.identification.judge.suspects.suspect import BY_CHANCE, Suspect, explains, penalty
 from shoal.identification.methods.lanes import Descent, descend_many
 from shoal.identification.methods.starts import starting_points
 from shoal.identification.recording.units import of_channels
 from shoal.identification.spread.intervals import Refit
+from shoal.identification.spread.uncertainty import followed
 from shoal.trajectory import Array
 
+_MOST_OF = 0.75
+"""Of what the best explains, where the rest is noise: what explains less is not what is wrong."""
+_TRUE = 0.5
+"""Of what derivatives promise: a fit that gains less does not confirm it."""
 _FITTED = 8
 """Candidates that are fitted at a time."""
 _FOLLOWED = 3
@@ -67,12 +74,14 @@ class Findings:
     """The suspects, those that explain most first, and the fits with each of them that is a number of the model.
 
     better: a minimum of the model itself that fits better, if met; cut: whether time was up before all were tried
+    hypotheses: the score tests, the most significant first
     """
 
     suspects: list[Suspect] = field(default_factory=list)
     refits: list[Refit] = field(default_factory=list)
     better: Descent | None = None
     cut: bool = False
+    hypotheses: list[Hypothesis] = field(default_factory=list)
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,15 +102,31 @@ class _Scored:
         return self.together.group[self.number]
 
 
-def suspects(model: ForwardModel, point: Array, residual: Array, jacobian: Array, noise: float = 0.0) -> Findings:
-    """What explains the residual at an answer, the best first. Runs are not counted.
+def suspects(
+    model: ForwardModel,
+    point: Array,
+    residual: Array,
+    jacobian: Array,
+    noise: float = 0.0,
+    *,
+    test: ScoreTest | None = None,
+    misfit: bool = True,
+) -> Findings:
+    """Return what explains the residual at an answer, the best first. Runs are not counted.
 
-    noise: what no explanation can go below [RMS]. Past the model's deadline it ends with what was found until then.
+    noise: what no explanation can go below [RMS]; test: of the hypotheses, which are not tested without
+    misfit: whether the residual is more than noise; else only what a score test finds is fitted
+    Past the model's deadline it ends with what was found until then.
     """
     search = _Search(model, point, residual, jacobian, noise)
-    cut = True
+    cut, tested = True, list[Hypothesis]()
     with suppress(TimeIsUp):
-        search.run()
+        simple = search.scores()
+        tested = table(test, search.measured) if test is not None else tested
+        if misfit:
+            search.run(simple)
+        else:
+            search.refute(simple, tested)
         cut = False
     rows = len(residual)
     # Clock and gravity explain a free swing equally well: the order of equals is that of their names.
@@ -109,7 +134,8 @@ def suspects(model: ForwardModel, point: Array, residual: Array, jacobian: Array
     found = sorted(told, key=lambda s: (float(f"{s.cost(rows):.2e}"), s.name))
     listed = [suspect for suspect in found if suspect.after <= _FAR * found[0].after]
     refits = [search.refits[s.name, s.kind] for s in listed if (s.name, s.kind) in search.refits]
-    return Findings([replace(s, alike=search.alike(s.name)) for s in listed], refits, search.better, cut)
+    named = [replace(s, alike=search.alike(s.name)) for s in listed]
+    return Findings(named, refits, search.better, cut, tested)
 
 
 class _Search:
@@ -119,27 +145,51 @@ class _Search:
         self.model = model.aside()
         self.point, self.residual, self.noise = point, residual, noise
         self.before = misfit(residual)
-        left, singular, right = np.linalg.svd(jacobian, full_matrices=False)
-        seen = singular > 1e-8 * max(float(singular[0]), 1e-300)
-        self.basis = left[:, seen]
-        self.inverse = (right[seen].T / singular[seen]) @ left[:, seen].T
+        self.by_chance = BY_CHANCE
+        self.basis, self.inverse = followed(jacobian)
         self.found: list[Suspect] = []
         self.refits: dict[tuple[str, str], Refit] = {}
         self.effects: dict[str, Array] = {}
+        self.measured: dict[tuple[str, str, int], list[Array]] = {}
+        self.simple: list[Candidate] = []
         self.ends: list[tuple[float, Array]] = []
         self.unfinished: list[tuple[float, Candidate, Array]] = []
         self.better: Descent | None = None
 
-    def run(self) -> None:
+    def scores(self) -> list[_Scored]:
+        """Measure the effects of all candidates that one call can try; those that promise something, the best first."""
+        self.simple = [*of_measurement(self.model), *of_machine(self.model)]
+        return self._promising(self.simple)
+
+    def refute(self, scored: list[_Scored], tested: list[Hypothesis]) -> None:
+        """Fit what a score test finds in a residual that else is noise, and keep what explains most of it."""
+        drops = {(row.name, row.kind): row.drop for row in tested if row.significant}
+        least = _MOST_OF * max(drops.values(), default=np.inf)
+        wrong = [s for s in scored if drops.get((s.candidate.name, s.candidate.kind), 0.0) >= least]
+        if not wrong:
+            return
+        promised = self.before**2 * max(row.explained for row in tested if row.significant)
+        self.noise = float(np.sqrt(max(self.before**2 - _TRUE * promised, 0.0)))
+        self.by_chance = 0.0  # the test has seen to that
+        self._fit(wrong[:_FITTED])
+        self._follow()
+        gained = self.before**2 - self._least**2
+        self.found = [s for s in self.found if self.before**2 - s.after**2 >= _MOST_OF * gained]
+        self._look_back()
+
+    def run(self, scored: list[_Scored]) -> None:
         """Candidates near the answer, other readings, candidates far from it; then whether a better minimum was met."""
-        simple = [*of_measurement(self.model), *of_machine(self.model)]
-        self._try(simple)
+        simple = self.simple
+        self._free_bounds()
+        if self._explained:
+            return
+        self._try(scored)
         gross = _GROSS * self.model.rows.signal
         if gross > 0.0 and self._least > gross:
             self._read()
         if self.model.scene.dimensions == 2 and not self._explained and self.before > self.noise:
             for dear in (shaken(self.model), bending(self.model)):
-                self._fit(self._near(self._promising([*dear]))[:_DEAR])
+                self._fit(self._near([s for s in self._promising([*dear]) if s.promise < _HOPELESS])[:_DEAR])
         # What lies near an answer that leaves little shows in the regression.
         if self._least > gross and not self._explained:
             places = np.vstack([self.point, starting_points(self.model)[:3]])
@@ -154,9 +204,9 @@ class _Search:
         sought = {*self.model.parameters.paths, *self.model.problem.ties}
         return [Together(self.model, group) for group in groups_of(c for c in candidates if not c.paths & sought)]
 
-    def _try(self, candidates: list[Candidate]) -> None:
+    def _try(self, scored: list[_Scored]) -> None:
         """Fit the most promising, then the next ones, until one explains the misfit wholly."""
-        scored = self._promising(candidates)
+        scored = [s for s in scored if s.promise < _HOPELESS]
         # A small fault does what its derivative says, a large one may do better.
         scored = scored if self.before > _GROSS * self.model.rows.signal else self._near(scored)
         for k in range(0, len(scored), _FITTED):
@@ -166,8 +216,7 @@ class _Search:
 
     def _promising(self, candidates: list[Candidate]) -> list[_Scored]:
         """Those that promise something, the best first."""
-        scored = [s for group in self._groups(candidates) for s in self._scored(group) if s.promise < _HOPELESS]
-        return sorted(scored, key=lambda s: s.promise)
+        return sorted((s for group in self._groups(candidates) for s in self._scored(group)), key=lambda s: s.promise)
 
     def _near(self, scored: list[_Scored]) -> list[_Scored]:
         """Those that promise hardly less than the best."""
@@ -202,6 +251,7 @@ class _Search:
         found = []
         for k, candidate in enumerate(together.group):
             effects = seen[np.array(owners) == k].reshape(*candidate.probes.shape[:2], -1)
+            self.measured[candidate.name, candidate.kind, len(candidate.parameters)] = list(effects)
             ways = [self._score(together, k, way, effect) for way, effect in enumerate(effects)]
             known = [way for way in ways if way is not None]
             if known:
@@ -259,6 +309,22 @@ class _Search:
             for k, end in zip(numbers, together.fit(numbers, starts), strict=True):
                 self._keep(together.group[k], end)
 
+    def _free_bounds(self) -> None:
+        """Fit without the bounds that the answer stands at: no further number is freed, and nothing else is blamed."""
+        which = at_bound(self.model, self.point)
+        if not which:
+            return
+        wider = without_bounds(self.model, which)
+        starts = np.vstack([self.point, starting_points(wider)[:3]])
+        end = min(descend_many(wider, starts, patience=_PATIENCE), key=lambda one: one.fitness)
+        after = misfit(end.residual)
+        if explains(self.before, after, self.noise, len(self.residual)):
+            outside = [k for k in which if not self.model.lower[k] <= end.point[k] <= self.model.upper[k]]
+            for k in outside:
+                bound, value, change = told(self.model, self.point, end.point, k)
+                name, unit = f"bound of {self.model.names[k]}", of_channels(self.model.measurement)
+                self.found.append(Suspect(name, bound, value, self.before, after, change, unit, "bounds", 0))
+
     def _follow(self) -> None:
         """Descend on where a fit was the best but for what it had still to go."""
         begun = sorted(self.unfinished, key=lambda entry: entry[0])
@@ -273,7 +339,7 @@ class _Search:
         self.ends.append((after, end.point[:known]))
         if not end.converged:
             self.unfinished.append((after, candidate, end.point))
-        if not explains(self.before, after, self.noise, len(self.residual)):
+        if not explains(self.before, after, self.noise, len(self.residual), self.by_chance):
             return
         value, change = candidate.told(values)
         stated = 0.0 if candidate.tell else candidate.stated[0]

@@ -17,6 +17,8 @@ from shoal.trajectory import Array
 
 _STEP = 1e-3
 """Of the largest stiffness and torque that are looked for: the change by which an effect is measured."""
+_CONSTANT = 100.0
+"""Radians: a spring at rest farther away pulls alike all along a motion."""
 _LARGEST = 10.0
 """Times the torque of the machine's weight, for each radian."""
 
@@ -61,8 +63,9 @@ def _candidate(name: str, size: Size, scene: Scene) -> Candidate:
 
     def tell(values: Array) -> tuple[float, str]:
         stiffness, torque = values.tolist()
-        rest = f", at rest at {torque / stiffness:.3g} rad" if stiffness > 0.0 else f", pulling with {torque:.3g} N m"
-        return stiffness, f"a stiffness of {stiffness:.3g} N m/rad{rest}"
+        if abs(torque) > _CONSTANT * stiffness:
+            return torque, f"a constant torque of {torque:.3g} N m"
+        return stiffness, f"a stiffness of {stiffness:.3g} N m/rad, at rest at {torque / stiffness:.3g} rad"
 
     words = f"torsion spring in {name}"
     return Candidate(words, "machine", numbers, (0.0, 0.0), probes, np.zeros((1, 2)), scene=scene, tell=tell)

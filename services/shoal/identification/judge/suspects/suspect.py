@@ -8,6 +8,8 @@ SEVERAL = 2.0
 """Times smaller: a misfit beyond the noise that falls by this factor is explained."""
 _CHANCE = 10.83
 """By how much one more parameter lowers a chi-square by chance once in a thousand times."""
+BY_CHANCE = 2 * _CHANCE
+"""The same of the best of many."""
 
 
 @dataclass(frozen=True)
@@ -15,7 +17,8 @@ class Suspect:
     """Something taken as known, the value it was given, the fitted one, and the misfit (RMS) with either.
 
     change: the two values in words; unit: of the misfits, empty where channels of different units are taken together
-    kind: `measurement`, `machine` or `data` (another reading of the recorded numbers); numbers: how many were fitted
+    kind: `measurement`, `machine`, `data` (another reading of the recorded numbers) or `bounds` (of what is sought)
+    numbers: how many were fitted beyond what is sought
     alike: other candidates of which a small fault has the same effect, whatever is measured by these channels
     """
 
@@ -55,8 +58,11 @@ def penalty(numbers: int, rows: int) -> float:
     return float(rows ** ((numbers - 1) / rows))
 
 
-def explains(before: float, after: float, noise: float, rows: int) -> bool:
-    """Whether a misfit that falls so, of so many rows with that noise, is explained: severalfold, and not by chance."""
+def explains(before: float, after: float, noise: float, rows: int, by_chance: float = BY_CHANCE) -> bool:
+    """Return whether a misfit that falls so, of so many rows with that noise, is explained: severalfold, not by chance.
+
+    by_chance: of chi-square, how far noise alone may lower it
+    """
     beyond = max(after**2 - noise**2, 0.0)
     severalfold = after * SEVERAL <= before or beyond * SEVERAL**2 <= before**2 - noise**2
-    return severalfold and (before**2 - after**2) * rows > 2 * _CHANCE * max(after, noise) ** 2
+    return severalfold and (before**2 - after**2) * rows > by_chance * max(after, noise) ** 2
