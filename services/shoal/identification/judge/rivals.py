@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from shoal.identification.forward import ForwardModel
-from shoal.identification.methods.lanes import damped_step, differentiate_many, differing, kept_apart
+from shoal.identification.methods.lanes import UNDAMPED, damped_step, differentiate_many, differing, kept_apart
 from shoal.identification.methods.outcome import Outcome
 from shoal.identification.spread.chances import chi_square_above
 from shoal.identification.spread.uncertainty import LEVEL, Linearisation
@@ -54,24 +54,48 @@ def valley(model: ForwardModel, outcome: Outcome, at: Linearisation) -> tuple[Ou
 
 
 def connected(model: ForwardModel, one: Array, other: Array, limit: float) -> bool:
-    """Whether a path leads from one point to another on which the fitness stays below a limit.
+    """Return whether a path leads from one point to another on which the fitness stays below a limit.
 
-    Points on the line between them descend across it, all side by side, for a few steps. Runs are not counted.
+    Points on the line between them descend across it, all side by side, for a few steps. A valley that bends is walked
+    from one end where that fails, each point from where the last one came to. Runs are not counted.
     """
     model = model.aside()
     span = model.upper - model.lower
-    difference = other - one
-    turns = 2 * np.pi * np.round(difference / (2 * np.pi))
-    way = (difference - np.where(model.parameters.turning, turns, 0.0)) / span
+    way = _way(model, one, other) / span
     across = np.linalg.svd(way[None])[2][1:].T * span[:, None]
     points = one + np.linspace(0.0, 1.0, _STATIONS + 2)[1:-1, None] * way * span
+    if np.all(_descended(model, points, across, limit)[1] <= limit):
+        return True
+    last, step = one, way * span / (_STATIONS + 1)
+    for _ in range(_STATIONS):
+        residual, jacobian = (found[0] for found in differentiate_many(model, last[None]))
+        wanted = last + step
+        if np.all(np.isfinite(jacobian)):
+            wanted = wanted + across @ _downhill(residual + jacobian @ step, jacobian @ across, UNDAMPED)
+        (last,), values = _descended(model, wanted[None], across, limit)
+        if not values[0] <= limit:
+            return False
+    # From the last one the line leads to the end itself.
+    between = last + np.linspace(0.0, 1.0, _STATIONS + 2)[1:-1, None] * _way(model, last, other)
+    return bool(np.all(_descended(model, between, across, limit)[1] <= limit))
+
+
+def _way(model: ForwardModel, one: Array, other: Array) -> Array:
+    """From one point to another, angles by less than a turn, (parameters,)."""
+    difference = other - one
+    turns = 2 * np.pi * np.round(difference / (2 * np.pi))
+    return np.asarray(difference - np.where(model.parameters.turning, turns, 0.0))
+
+
+def _descended(model: ForwardModel, points: Array, across: Array, limit: float) -> tuple[Array, Array]:
+    """Points (points, parameters) after a few steps along the columns of `across`, until below a limit; and fitnesses."""
     points = np.clip(points, model.lower, model.upper)
     residuals, jacobians = differentiate_many(model, points)
-    values, damping = model.cost(residuals), np.full(_STATIONS, 1e-3)
+    values, damping = model.cost(residuals), np.full(len(points), 1e-3)
     for _ in range(_STEPS):
-        above = np.flatnonzero(values > limit)
+        above = np.flatnonzero(~(values <= limit))
         if not above.size:
-            return True
+            break
         steps = [_downhill(residuals[k], jacobians[k] @ across, damping[k]) for k in above]
         trials = np.clip(points[above] + np.array(steps) @ across.T, model.lower, model.upper)
         found, slopes = differentiate_many(model, trials)
@@ -80,7 +104,7 @@ def connected(model: ForwardModel, one: Array, other: Array, limit: float) -> bo
         kept = above[lower]
         points[kept], residuals[kept], jacobians[kept] = trials[lower], found[lower], slopes[lower]
         values[kept] = model.cost(found[lower])
-    return bool(np.all(values <= limit))
+    return points, values
 
 
 def _downhill(residual: Array, jacobian: Array, damping: float) -> Array:
