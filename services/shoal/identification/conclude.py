@@ -81,7 +81,7 @@ def conclude(
     outcome, near = _settled(model, outcome, near)
     known = _known(model, outcome, near, wishes.profiles)
     judgement = _judged(model, near, known)
-    values = intervals.with_refits(known.values, judgement.refits)
+    values = intervals.with_refits(model, known.values, judgement.refits)
     ended = outcome.ended and judgement.verdict is not Verdict.UNFINISHED
     better = judgement.better or (unless_late(lambda: _lower(model, outcome, known.profiled), None) if ended else None)
     if better is not None and rounds > 0:

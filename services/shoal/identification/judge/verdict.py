@@ -146,7 +146,7 @@ def _by_findings(
         )
         advice = [f"{', or '.join(more)}, or narrow the bounds to the set that is meant"]
         return Judgement(Verdict.AMBIGUOUS, message, advice, found)
-    judged = _identifiable(model, seen, tests, with_refits(parameters, looked.refits), unknown, found, odd)
+    judged = _identifiable(model, seen, tests, with_refits(model, parameters, looked.refits), unknown, found, odd)
     return replace(judged, refits=looked.refits)
 
 
@@ -274,7 +274,7 @@ def _identifiable(
         reasons.append("only combinations are known: some changes of the parameters leave the motion unchanged")
         advice.append("fix one parameter of each combination, or rely on the quantities that are identifiable")
     elif vague := [name for name, v in parameters.items() if not v.identifiable and not v.at_bound]:
-        reasons.append(f"{', '.join(vague)}: less certain than the range of what is possible")
+        reasons.append(f"{', '.join(vague)}: known no better than by the bounds")
         advice.append("measure longer or with less noise, or add what is known as a prior")
     if not seen.reliable:
         known = f"rest on the first {seen.end:.3g} s" if seen.end is not None else "are in doubt"

@@ -68,7 +68,7 @@ def of_channels(measurement: Measurement) -> str:
 
 def of_channel(channel: Channel) -> str:
     """The unit of a channel's samples: px where nothing but the recording's `scale` says how large one is."""
-    return "px" if channel.unit == "px" and channel.scale == 1.0 else QUANTITIES[channel.quantity]
+    return "px" if channel.unit == "px" and abs(channel.scale) == 1.0 else QUANTITIES[channel.quantity]
 
 
 def squared(unit: str) -> str:

@@ -12,7 +12,7 @@ from shoal.identification.problem import RESERVED
 from shoal.identification.recording.units import unit
 from shoal.identification.spread.covariance import blocks_of
 from shoal.identification.spread.model_error import Corrections
-from shoal.identification.spread.uncertainty import Linearisation, Spread, linearise, spread
+from shoal.identification.spread.uncertainty import LEVEL, Linearisation, Spread, linearise, spread
 from shoal.identification.spread.value import Value
 from shoal.scene import expression
 from shoal.trajectory import Array
@@ -88,12 +88,24 @@ class Refit:
         return linearise(self.jacobian, self.residual, self.model.sizes(self.point), blocks)
 
 
-def with_refits(values: dict[str, Value], refits: list[Refit]) -> dict[str, Value]:
-    """Values whose intervals span those of refits too; what a refit leaves open is not identifiable."""
+def with_refits(model: ForwardModel, values: dict[str, Value], refits: list[Refit]) -> dict[str, Value]:
+    """Values whose intervals span those of refits too; what a refit leaves open is not identifiable.
+
+    Neither is what the data tell no better than the bounds do.
+    """
     ends = [values, *(refit.values() for refit in refits)]
     told = {name: all(end[name].identifiable for end in ends) for name in values}
     fixed = {name: all(end[name].fixed for end in ends) for name in values}
-    return {name: replace(value, identifiable=told[name], fixed=fixed[name]) for name, value in spanning(ends).items()}
+    found = {n: replace(value, identifiable=told[n], fixed=fixed[n]) for n, value in spanning(ends).items()}
+    return {n: replace(x, identifiable=x.identifiable and _narrower(model, k, x)) for k, (n, x) in enumerate(found.items())}
+
+
+def _narrower(model: ForwardModel, k: int, known: Value) -> bool:
+    """Return whether the interval of a parameter is narrower than that of a number anywhere between its bounds."""
+    ends = np.array([known.lower, known.upper])
+    if model.parameters.logarithmic[k]:
+        ends = np.log(np.maximum(ends, 1e-300))
+    return bool(ends[1] - ends[0] < LEVEL * (model.upper[k] - model.lower[k]))
 
 
 def covariance(model: ForwardModel, point: Array, at: Linearisation) -> Array:

@@ -7,13 +7,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shoal.errors import InputError
 from shoal.mechanics.analysis.evaluate import Evaluator, points
 from shoal.mechanics.analysis.felt import TURN, Felt, quarter
 from shoal.mechanics.assembly.build import build
 from shoal.mechanics.frames import RigidFrame
 from shoal.mechanics.numerics.tile import Array, Index
 from shoal.scene import Scene
+from shoal.scene.function import Function
+
+
+_STEP = 1e-6
+"""Of time, for the rates of moving points [s]."""
 
 
 @dataclass(frozen=True)
@@ -44,16 +48,19 @@ class _Rigid:
         self._frames = list(model.frames.values())
         found = points([vector for frame in self._frames for vector in frame.vectors], model.unknowns, of_model)
         matrix = found.matrix.reshape(found.constant.size, model.unknowns)
-        if model.unknowns and np.linalg.matrix_rank(matrix) < model.unknowns:
-            raise InputError("ground_points: sensors of force know no moving point that no body is joined to")
-        self._inverse, self._constant = np.linalg.pinv(matrix), found.constant
-        self.q = self._coordinates(self._places, self._angles)
+        # Moving points of the ground are the first unknowns (`place`), known by their functions.
+        paths = [f for path in model.stated.ground_points.values() for f in (path.x, path.y)]
+        self._driven, driven_rates = _followed(paths, course.times)
+        matrix = np.concatenate([matrix, np.eye(len(paths), model.unknowns)])
+        self._inverse = np.linalg.pinv(matrix)
+        self._constant = np.append(found.constant.ravel(), np.zeros(len(paths)))
+        self.q = self._coordinates(self._places, self._angles, self._driven)
         turning = rates[..., None] * quarter(_direction(self._angles))
-        self.v = self._stacked(velocities, turning) @ self._inverse.T
+        self.v = np.concatenate([self._stacked(velocities, turning), driven_rates], axis=1) @ self._inverse.T
 
-    def _coordinates(self, places: Array, angles: Array) -> Array:
-        """Of poses of the bodies, (samples, unknowns)."""
-        here = self._stacked(places, _direction(angles))
+    def _coordinates(self, places: Array, angles: Array, driven: Array) -> Array:
+        """Of poses of the bodies and places of moving points, (samples, unknowns)."""
+        here = np.concatenate([self._stacked(places, _direction(angles)), driven], axis=1)
         return np.asarray((here - self._constant.ravel()) @ self._inverse.T)
 
     def _stacked(self, origins: Array, directors: Array) -> Array:
@@ -72,7 +79,8 @@ class _Rigid:
                 share = np.arange(1, count)[:, None] / count
                 place = self._places[k - 1] + share[..., None] * (self._places[k] - self._places[k - 1])
                 angle = self._angles[k - 1] + share * (self._angles[k] - self._angles[k - 1])
-                way.append(self._coordinates(place, angle))
+                driven = self._driven[k - 1] + share * (self._driven[k] - self._driven[k - 1])
+                way.append(self._coordinates(place, angle, driven))
                 sample += [-1] * (count - 1)
             way.append(self.q[k : k + 1])
             sample.append(k)
@@ -96,6 +104,15 @@ def machine(scene: Scene, values: Mapping[str, Array], course: Course, lane: int
 def _felt(evaluator: Evaluator, course: Course, lane: int, of_model: int) -> Felt:
     rigid = _Rigid(evaluator, course, lane, of_model)
     return Felt(evaluator, course.times, rigid.q, rigid.v, rigid.way, of_model)
+
+
+def _followed(paths: list[Function], times: Array) -> tuple[Array, Array]:
+    """Values of functions of time at some times, (times, functions), and their rates."""
+    before = np.maximum(times - _STEP, 0.0)
+    now, ahead, behind = (
+        np.array([f(t) for f in paths]).reshape(-1, len(times)).T for t in (times, times + _STEP, before)
+    )
+    return now, (ahead - behind) / (times + _STEP - before)[:, None]
 
 
 def _direction(angle: Array) -> Array:
