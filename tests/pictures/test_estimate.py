@@ -100,9 +100,12 @@ def test_autocorrelation_of_known_noise() -> None:
 
 
 def test_words_tell_noise_from_what_the_model_lacks(flexible: Answer, several: Answer) -> None:
-    assert "look like noise" in white(several.estimate)
+    """One source: the picture says what the tests of the verdict say."""
+    assert "none, like white noise" in white(several.estimate)
     # The coarse mesh leaves a wave.
-    assert "are no noise" in white(flexible.estimate)
+    for answer in (several, flexible):
+        assert answer.estimate.residual_tests.correlation in white(answer.estimate)
+    assert not flexible.estimate.residual_tests.correlation.startswith("none")
     assert [axes.get_ylabel() for axes in residuals(several.estimate).axes][1] == "autocorrelation"
 
 

@@ -37,8 +37,11 @@ def test_page_says_what_the_numbers_say(pages: Callable[[str], str], several: An
 
 def test_numbers_have_the_digits_of_their_uncertainty(several: Answer) -> None:
     value = replace(several.estimate.parameters["density"], value=998.76543, std=1.23456, lower=996.2, upper=1001.3)
-    assert shown(value) == ("998.8", "1.2", "996.2 to 1001.3", "yes")
-    assert shown(replace(value, identifiable=False, at_bound=True)) == ("999", "–", "–", "at bound")
+    estimate = several.estimate
+    assert shown(estimate, value) == ("998.8", "1.2", "996.2 to 1001.3", "yes")
+    assert shown(estimate, replace(value, identifiable=False, at_bound=True)) == ("999", "–", "–", "at bound")
+    # Nothing is known by an answer that is none.
+    assert shown(replace(estimate, verdict=Verdict.REJECTED), value) == ("999", "–", "–", "no")
     assert rounded(1.23456e12, 1e9) == "1.2346e+12"
 
 

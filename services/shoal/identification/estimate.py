@@ -96,9 +96,15 @@ class Estimate:
         """`ok` if the answer can be used, else `failed`."""
         return "ok" if self.verdict.trusted else "failed"
 
+    def known(self, value: Value) -> str:
+        """Return whether a value is known, in a word: of a rejected or failed answer none is."""
+        if value.at_bound:
+            return "at bound"
+        return "yes" if value.identifiable and (self.verdict.trusted or self.verdict is Verdict.AMBIGUOUS) else "no"
+
     def __repr__(self) -> str:
         values = ", ".join(
-            f"{name} {value.value:.6g}" + (f" ± {value.std:.2g}" if value.identifiable else " (not known)")
+            f"{name} {value.value:.6g}" + (f" ± {value.std:.2g}" if self.known(value) == "yes" else " (not known)")
             for name, value in self.parameters.items()
         )
         return f"Estimate({self.problem}: {self.verdict}; {values})"

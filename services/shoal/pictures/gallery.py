@@ -82,7 +82,7 @@ def _around(answer: Answer) -> list[Drawn]:
     for zoom in (False, True):
         name = "landscape-zoom" if zoom else "landscape"
         alt = f"Contours of the fitness over {one} and {other}, {'around the answer' if zoom else 'in the whole box'}."
-        ellipse = " The ellipse is what the interval takes the valley for." if zoom and has_ellipse(answer) else ""
+        ellipse = " The ellipse holds 95 % of what noise alone does, other parameters fixed." if zoom and has_ellipse(answer) else ""
         caption = f"Dark is a good fit.{ellipse}"
         drawn.append(Drawn(name, landscape(answer, survey(answer, pair, zoom=zoom)), alt, caption))
     value = answer.correlation[pair]
@@ -123,6 +123,6 @@ def _prediction(answer: Answer) -> Drawn:
 
 def _residuals(answer: Answer) -> Drawn:
     figure = residuals(answer.estimate)
-    alt = f"Residuals against time and their autocorrelation. The {white(answer.estimate)}."
+    alt = f"Residuals against time and their autocorrelation; {white(answer.estimate)}."
     caption = "Noise stays in the orange bands: 95 % of the points should. A wave is something the model lacks."
     return Drawn("residuals", figure, alt, caption)

@@ -133,8 +133,8 @@ def _(trajectory: Trajectory) -> str:
 def _(estimate: Estimate) -> str:
     """The verdict, the values with their intervals, and the model over the data."""
     values = {**estimate.parameters, **estimate.quantities}
-    headings = ["parameter", "value", "standard deviation", "95 % interval", "known"]
-    rows = [[name, *shown(value)] for name, value in values.items()]
+    headings = ["parameter", "value", "standard deviation (noise)", "95 % interval", "known"]
+    rows = [[name, *shown(estimate, value)] for name, value in values.items()]
     picture = Drawn("overlay", overlay(estimate), "Measured values with the fitted model.", "The model over the data.")
     return _html(estimate.problem, verdict(estimate), estimate.method, headings, rows, picture)
 

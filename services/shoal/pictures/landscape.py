@@ -57,7 +57,7 @@ def _span(answer: Answer, k: int, zoom: bool, size: int) -> Array:
 
 @styled
 def landscape(answer: Answer, found: Landscape) -> Figure:
-    """Contours of the fitness with the answer, other ends of searches, and the 95 % ellipse of the linearisation."""
+    """Contours of the fitness with the answer, other ends of searches, and the 95 % ellipse of the noise alone."""
     figure, axes = canvas(5.2)
     to_values = answer.model.parameters.to_values
     grid = [np.repeat(answer.point[None], len(x), axis=0) for x in (found.first, found.second)]
@@ -104,7 +104,7 @@ def _mark(axes: Axes, answer: Answer, found: Landscape) -> None:
         values = answer.model.parameters.to_values(_ellipse(answer, found.pair))
         # The white rim shows the line on any colour.
         axes.plot(values[:, one], values[:, other], color="white", linewidth=3.5)
-        axes.plot(values[:, one], values[:, other], color=VERMILION, label="95 % of the linearisation")
+        axes.plot(values[:, one], values[:, other], color=VERMILION, label="95 %, noise alone, others fixed")
     answer_values = answer.model.parameters.to_values(answer.point)
     place = ([answer_values[one]], [answer_values[other]])
     axes.plot(*place, marker="*", color=VERMILION, markersize=13, label="the answer", **inside)

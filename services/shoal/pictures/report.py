@@ -39,7 +39,7 @@ def findings(answer: Answer, moving: list[Motion] | None = None, drawn: list[Dra
     truth = ["truth"] * bool(estimate.truth)
     return {
         "answer_title": "The answer" if estimate.verdict.trusted else "Numbers that are no answer",
-        "headings": ["parameter", "value", "standard deviation", "95 % interval", "known", *truth],
+        "headings": ["parameter", "value", "standard deviation (noise)", "95 % interval", "known", *truth],
         "rows": _rows(answer),
         "reasons": [_sentence(reason) for reason in estimate.message.split("; ") if reason],
         "remarks": _remarks(estimate),
@@ -55,13 +55,14 @@ def verdict(estimate: Estimate) -> str:
     return f"Verdict: {estimate.verdict}.{advice} {fit}"
 
 
-def shown(value: Value) -> tuple[str, str, str, str]:
+def shown(estimate: Estimate, value: Value) -> tuple[str, str, str, str]:
     """Value, standard deviation, 95 % interval and whether it is known, to two digits of the uncertainty."""
-    if not value.identifiable:
-        return f"{value.value:.3g}", "–", "–", "at bound" if value.at_bound else "no"
+    known = estimate.known(value)
+    if known != "yes":
+        return f"{value.value:.3g}", "–", "–", known
     unit = value.std if value.std > 0 else 1e-6 * abs(value.value)
     interval = f"{rounded(value.lower, unit)} to {rounded(value.upper, unit)}"
-    return rounded(value.value, unit), f"{value.std:.2g}", interval, "yes"
+    return rounded(value.value, unit), f"{value.std:.2g}", interval, known
 
 
 def provenance(estimate: Estimate) -> list[tuple[str, str]]:
@@ -87,7 +88,7 @@ def _rows(answer: Answer) -> list[list[str]]:
     for name, value in {**estimate.parameters, **estimate.quantities}.items():
         label = units.parameter(answer.problem, name) if name in estimate.parameters else name
         truth = [f"{estimate.truth[name]:.6g}" if name in estimate.truth else ""] if estimate.truth else []
-        rows.append([label, *shown(value), *truth])
+        rows.append([label, *shown(estimate, value), *truth])
     return rows
 
 

@@ -51,13 +51,12 @@ def autocorrelation(residual: Array, most: int = _LAGS) -> Array:
 
 
 def white(estimate: Estimate) -> str:
-    """Whether the residuals look like white noise, by how many autocorrelations lie outside the band; in words."""
-    told = [_outside(signal) for signal in signals(estimate)]
-    outside, lags = sum(o for o, _ in told), sum(n for _, n in told)
-    share = outside / max(lags, 1)
-    if share <= 0.1:
-        return f"residuals look like noise ({100 * share:.0f} % of lags outside the band)"
-    return f"residuals are no noise ({100 * share:.0f} % of lags outside the band)"
+    """What the tests of the verdict say of the residuals' correlation, and how many lags lie outside the band."""
+    counts = [_outside(signal) for signal in signals(estimate)]
+    outside, lags = sum(o for o, _ in counts), sum(n for _, n in counts)
+    tests = estimate.residual_tests
+    found = tests.correlation if tests.made else "not tested"
+    return f"correlation of the residuals: {found} ({100 * outside / max(lags, 1):.0f} % of lags outside the band)"
 
 
 def _outside(signal: Signal) -> tuple[int, int]:

@@ -62,7 +62,7 @@ def _headings(chosen: Answer) -> list[str]:
 
 
 def _row(name: str, estimate: Estimate) -> list[str]:
-    values = [shown(value)[0] for value in estimate.parameters.values()]
+    values = [shown(estimate, value)[0] for value in estimate.parameters.values()]
     numbers = [power(estimate.fitness), f"{estimate.rms:.3g}", str(estimate.evaluations), f"{estimate.wall_s:.1f}"]
     return [name, *values, *numbers, str(estimate.verdict)]
 
@@ -73,7 +73,7 @@ def _summary(estimates: Mapping[str, Estimate], best: str) -> list[str]:
     name = estimates[best].problem
     sentences += [f"{text.removeprefix(f'{name}: ').capitalize()}." for text in (titles.leaves(name, estimates),)]
     for parameter, value in estimates[best].parameters.items():
-        number, _, interval, known = shown(value)
+        number, _, interval, known = shown(estimates[best], value)
         if known != "yes":
             sentences.append(f"{parameter} is not known from these data ({known}).")
             continue

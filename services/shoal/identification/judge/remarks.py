@@ -11,6 +11,8 @@ from shoal.identification.spread.value import Value
 
 _NOTICED = 0.1
 """Of half an interval: a contribution to it that is worth a word."""
+_WIDE = 3.0
+"""Standard deviations on each side: an interval that is wider holds more than noise."""
 _ALIKE = 3.0
 """A residual within this factor of the mesh error is explained by it."""
 
@@ -48,10 +50,25 @@ def remarks(
             widens = f"widens the interval of {widened}" if widened else ""
             change = " and ".join(part for part in (excess, widens) if part)
             found.append(f"the time error of {tests.sized(mesh)} {change}: use {SMALLER}")
+    wide = [n for n, v in parameters.items() if v.identifiable and v.upper - v.lower > _WIDE * 2 * v.std > 0.0]
+    if besides := _besides(parameters, wide, tests, profiled):
+        found.append(f"the intervals of {', '.join(wide)} hold {besides} too, the standard deviations noise alone")
     if theory is not None and (widened := _limited(parameters, "theory")):
         change = f"change the motion by about {tests.sized(theory)} and widen the interval of {widened}"
         found.append(f"shear and rotary inertia, which slender beams neglect, {change}")
     return found
+
+
+def _besides(
+    parameters: Mapping[str, Value], wide: list[str], tests: ResidualTests, profiled: Mapping[str, Profile]
+) -> str:
+    """What intervals hold besides noise, in words; nothing where that is not known."""
+    if not wide:
+        return ""
+    parts = {part for name in wide for part in ("correction", "theory") if getattr(parameters[name], part)}
+    found = ["the model's own error"] * bool(parts) + ["the systematic residual"] * (tests.excess > 0.0)
+    found += ["the curvature of the misfit"] * any(name in profiled for name in wide)
+    return " and ".join(found)
 
 
 def _limited(parameters: Mapping[str, Value], part: str) -> str:

@@ -154,11 +154,13 @@ class ResidualTests:
         found = [f"size: {size}{against}"]
         if self.signal > 0:
             found[0] += f", {_digits(100 * self.size / self.signal, 1)} % of the spread of the data"
-        found.append(f"correlation: {self._correlation()}")
+        found.append(f"correlation: {self.correlation}")
         found.append(f"outliers: {self.outliers} of {self.rows} samples" if self.outliers else "outliers: none")
         return found
 
-    def _correlation(self) -> str:
+    @property
+    def correlation(self) -> str:
+        """What the residuals' correlation shows, in words."""
         if self.size < _ROUND_OFF * self.signal:
             return "that of round-off"
         if not self.white:

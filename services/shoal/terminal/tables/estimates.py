@@ -20,10 +20,10 @@ def estimate_table(estimate: Estimate) -> None:
     screen.say(*(f"  {reason}" for reason in filter(None, estimate.message.split("; "))))
     table = screen.table(f"{estimate.problem}, {estimate.method}", "parameter", "value", "95 % interval", "known")
     for name, value in {**estimate.parameters, **estimate.quantities}.items():
-        known = "yes" if value.identifiable else "at bound" if value.at_bound else "no"
+        known = estimate.known(value)
         # Two digits of the uncertainty; a value that is not known has none that mean anything.
-        unit = value.std if value.identifiable and value.std > 0 else abs(value.value) * 1e-2
-        interval = f"{rounded(value.lower, unit)} to {rounded(value.upper, unit)}" if value.identifiable else "-"
+        unit = value.std if known == "yes" and value.std > 0 else abs(value.value) * 1e-2
+        interval = f"{rounded(value.lower, unit)} to {rounded(value.upper, unit)}" if known == "yes" else "-"
         label = f"{name} [{value.unit}]" if value.unit else name
         table.add_row(escape(label), rounded(value.value, unit), interval, known)
     screen.out.print(table)
