@@ -14,7 +14,7 @@ from shoal.identification.estimate import Estimate
 from shoal.identification.evidence import Evidence, evidence
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.other_laws import OtherLaw, other_laws, sentences
-from shoal.identification.judge.remarks import remarks
+from shoal.identification.judge.remarks import beyond_noise, remarks
 from shoal.identification.judge.rivals import valley
 from shoal.identification.judge.turns import with_nearest_turns
 from shoal.identification.judge.verdict import Judgement, Verdict, judge
@@ -103,6 +103,7 @@ def conclude(
     notes = [
         judgement.message or outcome.message,
         *(_of_laws(model, near, known.laws, values) if fits else []),
+        beyond_noise(values, known.profiled, near.tests) if fits else "",
         *remarks(
             values,
             known.profiled,

@@ -82,7 +82,11 @@ def _around(answer: Answer) -> list[Drawn]:
     for zoom in (False, True):
         name = "landscape-zoom" if zoom else "landscape"
         alt = f"Contours of the fitness over {one} and {other}, {'around the answer' if zoom else 'in the whole box'}."
-        ellipse = " The ellipse holds 95 % of what noise alone does, other parameters fixed." if zoom and has_ellipse(answer) else ""
+        ellipse = (
+            " The ellipse holds 95 % of what noise alone does, other parameters fixed."
+            if zoom and has_ellipse(answer)
+            else ""
+        )
         caption = f"Dark is a good fit.{ellipse}"
         drawn.append(Drawn(name, landscape(answer, survey(answer, pair, zoom=zoom)), alt, caption))
     value = answer.correlation[pair]

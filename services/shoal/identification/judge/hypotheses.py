@@ -1,7 +1,7 @@
 """Score tests of nested models (Rao 1948): whether the data contradict something that was taken as known.
 
-Each hypothesis frees something stated: a mass, a clock, the place of a pivot. Its effect on the residual, orthogonalised
-to what the sought parameters follow, foretells to first order by how much chi-square drops if it is freed. Without a
+Each hypothesis frees something stated: a mass, a clock, the place of a pivot. Its effect on the residual, made
+orthogonal to what the sought parameters follow, gives to first order the drop of chi-square if it is freed. Without a
 fault the drop over its freedom is F-distributed. One Jacobian serves all hypotheses, and they are tested together: many
 of them act alike, so that the number of independent tests is the one that the correlations of their effects leave
 (Li and Ji, Heredity 95, 2005).
@@ -105,7 +105,7 @@ class ScoreTest:
         return np.asarray(kept - kept @ self.basis @ self.basis.T)
 
     def _shares(self, own: Array, noise: Sequence[Noise]) -> Array:
-        """The share of each block of noise, and of each thing given, in the covariance of the slopes, (shares, n, n)."""
+        """Shares of the blocks of noise, and of what is given, in the covariance of the slopes, (shares, n, n)."""
         found = []
         for block, seen in zip(self.blocks, noise, strict=True):
             part = own[:, block.rows].T
@@ -154,4 +154,3 @@ def _above_f(count: int, freedom: float, ratio: float) -> float:
     from scipy.special import fdtrc  # slow to import
 
     return float(fdtrc(count, freedom, ratio)) if ratio > 0.0 else 1.0
-

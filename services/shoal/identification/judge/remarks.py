@@ -50,25 +50,21 @@ def remarks(
             widens = f"widens the interval of {widened}" if widened else ""
             change = " and ".join(part for part in (excess, widens) if part)
             found.append(f"the time error of {tests.sized(mesh)} {change}: use {SMALLER}")
-    wide = [n for n, v in parameters.items() if v.identifiable and v.upper - v.lower > _WIDE * 2 * v.std > 0.0]
-    if besides := _besides(parameters, wide, tests, profiled):
-        found.append(f"the intervals of {', '.join(wide)} hold {besides} too, the standard deviations noise alone")
     if theory is not None and (widened := _limited(parameters, "theory")):
         change = f"change the motion by about {tests.sized(theory)} and widen the interval of {widened}"
         found.append(f"shear and rotary inertia, which slender beams neglect, {change}")
     return found
 
 
-def _besides(
-    parameters: Mapping[str, Value], wide: list[str], tests: ResidualTests, profiled: Mapping[str, Profile]
-) -> str:
-    """What intervals hold besides noise, in words; nothing where that is not known."""
-    if not wide:
-        return ""
+def beyond_noise(parameters: Mapping[str, Value], profiled: Mapping[str, Profile], tests: ResidualTests) -> str:
+    """Say which intervals hold much more than the standard deviations, and what; nothing where none does."""
+    wide = [n for n, v in parameters.items() if v.identifiable and v.upper - v.lower > _WIDE * 2 * v.std > 0.0]
     parts = {part for name in wide for part in ("correction", "theory") if getattr(parameters[name], part)}
     found = ["the model's own error"] * bool(parts) + ["the systematic residual"] * (tests.excess > 0.0)
     found += ["the curvature of the misfit"] * any(name in profiled for name in wide)
-    return " and ".join(found)
+    if not wide or not found:
+        return ""
+    return f"the intervals of {', '.join(wide)} hold {' and '.join(found)} too, the standard deviations noise alone"
 
 
 def _limited(parameters: Mapping[str, Value], part: str) -> str:

@@ -88,7 +88,7 @@ def _way(model: ForwardModel, one: Array, other: Array) -> Array:
 
 
 def _descended(model: ForwardModel, points: Array, across: Array, limit: float) -> tuple[Array, Array]:
-    """Points (points, parameters) after a few steps along the columns of `across`, until below a limit; and fitnesses."""
+    """Points (points, parameters) after a few steps along the columns of `across`, and their fitness, (points,)."""
     points = np.clip(points, model.lower, model.upper)
     residuals, jacobians = differentiate_many(model, points)
     values, damping = model.cost(residuals), np.full(len(points), 1e-3)

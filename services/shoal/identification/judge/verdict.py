@@ -83,7 +83,7 @@ def judge(
     unknown: list[str],
 ) -> Judgement:
     """The verdict on an outcome: failures first, then the minimum, the model, rivals, and what is identifiable."""
-    seen, at, tests = near.seen, near.at, near.tests
+    seen, tests = near.seen, near.tests
     if not outcome.ended:
         advice = ["allow more time, or start from a better place"]
         return Judgement(Verdict.FAILED, outcome.message or "the method did not come to its end", advice)
@@ -199,7 +199,7 @@ def _rejected(
 ) -> Judgement:
     """odd: what is said, and to do, about a stretch that contradicts the rest."""
     reason = f"the best fit is off by {tests.sized(tests.size)}, {_against(tests)}"
-    advice = []
+    advice = list[str]()
     if found:
         cause, advice = _named(found, tests.rows)
         reason += f"; {cause}"
@@ -266,7 +266,7 @@ def _identifiable(
     odd: tuple[str, str],
 ) -> Judgement:
     """Identified, wholly or up to a combination, with what has to be said beside."""
-    reasons, notes, advice = [], [], []
+    reasons, notes, advice = list[str](), list[str](), list[str]()
     if at_bound := [name for name, value in parameters.items() if value.at_bound]:
         reasons.append(f"{', '.join(at_bound)} ended at a bound and is not identified")
         advice.append("widen the bound, or give the parameter its value there")

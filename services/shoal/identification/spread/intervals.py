@@ -97,7 +97,9 @@ def with_refits(model: ForwardModel, values: dict[str, Value], refits: list[Refi
     told = {name: all(end[name].identifiable for end in ends) for name in values}
     fixed = {name: all(end[name].fixed for end in ends) for name in values}
     found = {n: replace(value, identifiable=told[n], fixed=fixed[n]) for n, value in spanning(ends).items()}
-    return {n: replace(x, identifiable=x.identifiable and _narrower(model, k, x)) for k, (n, x) in enumerate(found.items())}
+    return {
+        n: replace(x, identifiable=x.identifiable and _narrower(model, k, x)) for k, (n, x) in enumerate(found.items())
+    }
 
 
 def _narrower(model: ForwardModel, k: int, known: Value) -> bool:

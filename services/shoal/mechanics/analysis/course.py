@@ -15,7 +15,6 @@ from shoal.mechanics.numerics.tile import Array, Index
 from shoal.scene import Scene
 from shoal.scene.function import Function
 
-
 _STEP = 1e-6
 """Of time, for the rates of moving points [s]."""
 

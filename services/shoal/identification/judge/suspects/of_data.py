@@ -55,7 +55,7 @@ def of_data(model: ForwardModel) -> Iterator[Reading]:
     turning = {"angle", "rate"} & kinds
     for factor in (_UNITS[3], 1 / _UNITS[3]) if turning else ():
         if _TURNS[0] < factor * _largest(runs, turning) < _TURNS[1]:
-            name, change = "unit of the angles", f"a factor of {factor:.4g}"
+            name, change = "unit of the angles", f"a factor of {factor:.4g} (degrees and radians)"
             yield Reading(name, change, _read(model, _scaled(turning, factor)), factor, factor)
     for factor in (1e-3, 1e3, 1e-2, 1e2, 1 / 60.0, 60.0):
         if not _SWINGS[0] < factor * model.measurement.end * machine.rate < _SWINGS[1]:
@@ -108,9 +108,9 @@ def _of_a_kind(one: Channel, other: Channel) -> bool:
 
 
 def _largest(runs: Iterable[Recording], quantities: set[str]) -> float:
-    """The largest number among channels of some quantities."""
+    """The largest number among channels of some quantities, less what is stated as their offset."""
     return max(
-        float(np.nanmax(np.abs(run.values[:, k])))
+        float(np.nanmax(np.abs(run.values[:, k] - channel.offset)))
         for run in runs
         for k, channel in enumerate(run.channels)
         if channel.quantity in quantities
@@ -124,14 +124,17 @@ def _read(model: ForwardModel, change: Callable[[Recording], Recording]) -> Forw
 def _scaled(quantities: set[str], factor: float) -> Callable[[Recording], Recording]:
     def change(run: Recording) -> Recording:
         factors = np.array([factor if channel.quantity in quantities else 1.0 for channel in run.channels])
-        return replace(run, values=run.values * factors, noise=run.noise * np.abs(factors))
+        # An offset is stated in SI units: what is read otherwise is the column.
+        offset = np.array([channel.offset for channel in run.channels])
+        return replace(run, values=offset + (run.values - offset) * factors, noise=run.noise * np.abs(factors))
 
     return change
 
 
 def _turned(name: str) -> Callable[[Recording], Recording]:
     def change(run: Recording) -> Recording:
-        return replace(run, values=run.values * np.array([-1.0 if c.name == name else 1.0 for c in run.channels]))
+        sense, offset = np.array([(-1.0 if c.name == name else 1.0, c.offset) for c in run.channels]).T
+        return replace(run, values=offset + (run.values - offset) * sense)
 
     return change
 

@@ -72,8 +72,10 @@ def _of(runs: list[Recording], name: str | None = None) -> Iterator[Candidate]:
 
 
 def _delay(name: str, stated: float, end: float, own: tuple[str, ...]) -> Candidate:
-    """Late after the release, or held before it. Of a short hold the parameters follow all but a kink, which no
-    derivative shows: several holds are tried."""
+    """Late after the release, or held before it.
+
+    Of a short hold the parameters follow all but a kink, which no derivative shows: several holds are tried.
+    """
     bounds = (stated - _EARLY * end, stated + _LATE * end)
     free = Parameter(path=f"{RESERVED}.delay", lower=bounds[0], upper=bounds[1], scale="linear", own=own or False)
     held = end * np.geomspace(_SHORTEST, _EARLY, _HOLDS)

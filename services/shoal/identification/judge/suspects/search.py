@@ -181,11 +181,12 @@ class _Search:
         """Candidates near the answer, other readings, candidates far from it; then whether a better minimum was met."""
         simple = self.simple
         self._free_bounds()
-        if self._explained:
+        by_bounds = self._explained
+        if by_bounds:
             return
         self._try(scored)
         gross = _GROSS * self.model.rows.signal
-        if gross > 0.0 and self._least > gross:
+        if self.before > gross > 0.0 and not self._explained:
             self._read()
         if self.model.scene.dimensions == 2 and not self._explained and self.before > self.noise:
             for dear in (shaken(self.model), bending(self.model)):
@@ -268,7 +269,7 @@ class _Search:
         if np.linalg.norm(own) <= _UNSEEN * np.linalg.norm(effects):
             return None
         left = self.residual - self.basis @ (self.basis.T @ self.residual)
-        wanted = np.linalg.lstsq(own.T, -left)[0]
+        wanted = np.asarray(np.linalg.lstsq(own.T, -left)[0], dtype=float)
         amounts = candidate.amounts(way, candidate.at(way, wanted))
         smaller = float(np.linalg.norm(left + amounts @ own)) / float(np.linalg.norm(self.residual))
         starts = []
