@@ -224,7 +224,8 @@ def _judged(model: ForwardModel, near: Evidence, known: _Known) -> Judgement:
     """The verdict; a failure where the answer cannot be simulated."""
     if near.possible:
         late = Judgement(Verdict.FAILED, "no time was left to judge the answer", ["allow more time"])
-        return unless_late(lambda: judge(model, known.outcome, near, known.values, known.combinations), late)
+        at_answer = near.seen, near.at, near.tests, near.score_test(model)
+        return unless_late(lambda: judge(model, known.outcome, *at_answer, known.values, known.combinations), late)
     why = f" ({model.failure})" if model.failure else ""
     return Judgement(Verdict.FAILED, f"no parameter set could be simulated{why}; look at starts, bounds and the scene")
 

@@ -9,10 +9,9 @@ from enum import StrEnum
 import numpy as np
 
 from shoal.identification.deadline import TimeIsUp, unless_late
-from shoal.identification.evidence import Evidence
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.exchanged import exchanged
-from shoal.identification.judge.hypotheses import Hypothesis
+from shoal.identification.judge.hypotheses import Hypothesis, ScoreTest
 from shoal.identification.judge.odd_one import odd_one
 from shoal.identification.judge.residual_tests import ResidualTests, residual_tests
 from shoal.identification.judge.rivals import ALIAS, relation, rivals_of, within
@@ -25,7 +24,7 @@ from shoal.identification.methods.outcome import Outcome
 from shoal.identification.spread.covariance import blocks_of
 from shoal.identification.spread.intervals import Refit, few, with_refits
 from shoal.identification.spread.sensitivity import Sensitivity
-from shoal.identification.spread.uncertainty import linearise
+from shoal.identification.spread.uncertainty import Linearisation, linearise
 from shoal.identification.spread.value import Value
 from shoal.trajectory import Array
 
@@ -78,12 +77,17 @@ class Judgement:
 def judge(
     model: ForwardModel,
     outcome: Outcome,
-    near: Evidence,
+    seen: Sensitivity,
+    at: Linearisation,
+    tests: ResidualTests,
+    test: ScoreTest,
     parameters: dict[str, Value],
     unknown: list[str],
 ) -> Judgement:
-    """The verdict on an outcome: failures first, then the minimum, the model, rivals, and what is identifiable."""
-    seen, tests = near.seen, near.tests
+    """The verdict on an outcome: failures first, then the minimum, the model, rivals, and what is identifiable.
+
+    seen, at, tests: derivatives, linearisation and residual tests there; test: of what was taken as known
+    """
     if not outcome.ended:
         advice = ["allow more time, or start from a better place"]
         return Judgement(Verdict.FAILED, outcome.message or "the method did not come to its end", advice)
@@ -102,22 +106,23 @@ def judge(
     misfitting = (tests.limited or tests.wrong_model) and seen_well
     if seen_well:
         at_answer = outcome.point, seen.residual, seen.jacobian, tests.explained
-        looked = suspects(model, *at_answer, test=near.score_test(model), misfit=misfitting)
-    judged = _by_findings(model, outcome, near, parameters, unknown, looked, misfitting)
+        looked = suspects(model, *at_answer, test=test, misfit=misfitting)
+    judged = _by_findings(model, outcome, seen, at, tests, parameters, unknown, looked, misfitting)
     return replace(judged, hypotheses=looked.hypotheses)
 
 
 def _by_findings(
     model: ForwardModel,
     outcome: Outcome,
-    near: Evidence,
+    seen: Sensitivity,
+    at: Linearisation,
+    tests: ResidualTests,
     parameters: dict[str, Value],
     unknown: list[str],
     looked: Findings,
     misfitting: bool,
 ) -> Judgement:
     """The verdict on a minimum, by what was found of the things taken as known."""
-    seen, at, tests = near.seen, near.at, near.tests
     if looked.better is not None:
         reason = f"a better minimum was met, of fitness {looked.better.fitness:.3g} instead of {outcome.fitness:.3g}"
         advice = ["look for another minimum (--method multi-start)"]
