@@ -30,11 +30,12 @@ from shoal.engines.sweep import sweep
 from shoal.identification import Estimate, identify, load_problem
 from shoal.identification.design import design
 from shoal.mechanics import notes, warm
+from shoal.mechanics.analysis.campbell import campbell
 from shoal.mechanics.analysis.modes import modes
 from shoal.mechanics.analysis.reactions import reactions
 from shoal.mechanics.analysis.statics import statics
 from shoal.mechanics.machine import Machine
-from shoal.scene import load_scene
+from shoal.scene import Scene, load_scene
 from shoal.selection import Selection, select
 from shoal.terminal import screen, tables
 
@@ -42,6 +43,20 @@ WIDTH = 80
 CONTROL = re.compile(r"[\x00-\x09\x0b-\x1f\x7f]")
 PENDULUM, DOUBLE = "single-pendulum", load_scene("rigid-double-pendulum")
 SPATIAL = DOUBLE.with_values({"dimensions": 3})
+ROTOR = Scene.parse(
+    {
+        "name": "rotor",
+        "gravity": [0.0, 0.0],
+        "bodies": {"disc": {"kind": "rigid-body", "mass": 2.0, "inertia": 0.1}},
+        "loads": {
+            name: {"kind": "spring", "first": {"body": "ground", "point": place}, "second": {"body": "disc"},
+                   "stiffness": 1e4 / 3}
+            for name, place in {"x": [1.0, 0.0], "y": [0.0, 1.0]}.items()
+        },
+        "markers": {"m": {"body": "disc"}},
+        "initial": {"disc": {"position": [0.0, 0.0], "rate": 100.0}},
+    }
+)  # fmt: skip
 ANGLES = {path: np.array([0.1, 1.0]) for path in ("initial.OA.angle", "initial.AB.angle")}
 
 
@@ -68,6 +83,8 @@ TABLES: dict[str, Callable[[], None]] = {
     "comparison": lambda: tables.comparison_table(compare(DOUBLE, ["gauss", "casadi"], [0.1])),
     "equilibrium": lambda: tables.equilibrium_table(statics(DOUBLE)),
     "modes": lambda: tables.modes_table(modes(DOUBLE)),
+    "modes of a rotor": lambda: tables.modes_table(modes(ROTOR)),
+    "Campbell diagram": lambda: tables.modes_table(campbell(ROTOR, [0.0, 123.456])),
     "sweep in space": lambda: tables.sweep_table(sweep(SPATIAL, ANGLES, get_engine("gauss"), 0.1)),
     "comparison in space": lambda: tables.comparison_table(compare(SPATIAL, ["gauss", "tree"], [0.1])),
     "equilibrium in space": lambda: tables.equilibrium_table(statics(SPATIAL)),

@@ -24,7 +24,7 @@ from shoal.mechanics.analysis.evaluate import Evaluator, points
 from shoal.mechanics.analysis.singular import crossing
 from shoal.mechanics.analysis.small_motions import hides, pull
 from shoal.mechanics.analysis.statics import statics
-from shoal.mechanics.analysis.steady import NotSteadyError, Steady, steady_motion
+from shoal.mechanics.analysis.steady import EXACT, NotSteadyError, Steady, steady_motion
 from shoal.mechanics.analysis.whirl import whirls
 from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.assembly.placement import place
@@ -133,7 +133,8 @@ class Modes:
         sources = {name: errors for name, errors in known.items() if errors}
         lacking = dict.fromkeys(self.not_estimated)
         each = range(len(self.modes))
-        rounding = {} if sources or lacking else {"rounding": float(np.finfo(float).eps)}
+        digits = float(np.finfo(float).eps) if self.speed is None else EXACT
+        rounding = {} if sources or lacking else {"rounding": digits}
         return tuple(
             ErrorBudget({**{name: errors[k] for name, errors in sources.items()}, **lacking, **rounding}, RELATIVE)
             for k in each

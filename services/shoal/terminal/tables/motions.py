@@ -210,12 +210,14 @@ def modes_table(modes: Modes | Campbell) -> None:
         return
     turning = ("whirl", "frame") if modes.speed is not None else ()
     known = any(error.total is not None for error in modes.errors)
-    headings = ("mode", "frequency [Hz]", "[rad/s]", "damping ratio", "growth [1/s]", "kind", *turning)
-    headings += ("error",) if known else ()
+    # All of them do not fit on a line; --json has the others.
+    figures = ("frequency [Hz]", *(() if turning else ("[rad/s]", "damping ratio")), "growth [1/s]")
+    headings = ("mode", *figures, "kind", *turning, *(("error",) if known else ()))
     table = screen.table(f"{modes.scene.name}: small motions about the {modes.about}", *headings)
     table.columns[headings.index("kind")].no_wrap = True
     for number, mode in enumerate(modes.modes, 1):
-        numbers = (mode.frequency, mode.angular_frequency, mode.damping_ratio, mode.eigenvalue.real)
+        also = () if turning else (mode.angular_frequency, mode.damping_ratio)
+        numbers = (mode.frequency, *also, mode.eigenvalue.real)
         seen = (mode.whirl or "-", mode.frame) if turning else ()
         error = [] if not known else ["-" if (off := modes.errors[number - 1].total) is None else f"{off:.1e}"]
         table.add_row(str(number), *(f"{value:.6g}" for value in numbers), mode.kind, *seen, *error)
