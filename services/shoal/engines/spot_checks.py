@@ -48,10 +48,5 @@ def spot_check(
     return check
 
 
-def larger(one: float | None, other: float | None) -> float | None:
-    """The larger of two errors, as far as they are known."""
-    return max((error for error in (one, other) if error is not None), default=None)
-
-
 def _words(values: dict[str, float]) -> str:
     return ", ".join(f"{path} = {value:.4g}" for path, value in values.items())
