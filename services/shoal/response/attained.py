@@ -13,13 +13,17 @@ from shoal.response.enclosure import enclosure, foretold
 from shoal.response.extremes import Extremes, Surrogate, extremes
 from shoal.response.result import Bounds
 from shoal.response.runs import TooManyRunsError
-from shoal.response.study import Enclosure, Found, Study
+from shoal.response.study import FINE_GAP, Enclosure, Found, Study
 from shoal.trajectory import Array
 
 DRAWN = 93
 """Random runs between whose extremes 95 % of all lie with 95 % confidence: 1 - 0.95^n - n 0.05 0.95^(n-1) >= 0.95."""
 TESTED, APART = 1, 0.05
 """Extremal points that are run for each parameter, and how far apart, where a surrogate of cycles tells the bounds."""
+ATTAINING, AT_ONCE = 16, 64
+"""Times the fair number of runs that are made at most to attain bounds of a surrogate of cycles, so many at once."""
+ATTAINED = 0.1
+"""Share of the gap by which a run may lie inside what is foretold and count as attaining it."""
 STARTS = 8
 """Searches for the extremes of a surrogate of cycles."""
 BELIEVED = 0.2
@@ -41,6 +45,8 @@ def bounds_of(study: Study, found: Found) -> Bounds:
             error = _tested(study, surrogate, named, error)
         if error is not None and not runs.controls:
             error = _controlled(study, surrogate, error)
+        if found.foretold:
+            _attain(study, surrogate, named)
     values, germs = runs.values, runs.germs
     at_lower, at_upper = germs[values.argmin(axis=0)], germs[values.argmax(axis=0)]
     lower, upper = values.min(axis=0), values.max(axis=0)
@@ -50,8 +56,6 @@ def bounds_of(study: Study, found: Found) -> Bounds:
         told = found.looked.told
     elif surrogate is not None and named is not None and error is not None:
         told = (foretold if found.foretold else enclosure)(study, surrogate, named, error)
-        at_lower = np.where((told.lower < lower)[:, None], named.at_lower, at_lower)
-        at_upper = np.where((told.upper > upper)[:, None], named.at_upper, at_upper)
     end = _horizon(study, told.gap)
     within = told.gap[study.instants <= end]
     return Bounds(
@@ -133,6 +137,34 @@ def _tested(study: Study, surrogate: Surrogate, named: Extremes, error: Array) -
         return error
     missed = np.abs(surrogate(runs.germs[made:]) - runs.values[made:]).max(axis=0)
     return np.maximum(error, study.largest(missed, runs.values))
+
+
+def _attain(study: Study, surrogate: Surrogate, named: Extremes) -> None:
+    """Make the runs at the arguments of the extremes: one attains all that the surrogate foretells no better elsewhere.
+
+    Of all arguments that one is next whose run attains most; as many as the gap that is asked for takes, or `ATTAINING`
+    times the fair number of runs.
+    """
+    runs, values = study.runs, study.runs.values
+    most = runs.left if study.gap is not None else min(runs.left, ATTAINING * study.fair)
+    near = ATTAINED * (study.gap or FINE_GAP) * study.widths(values)
+    best = np.concatenate([named.lower, -named.upper])
+    signs, near = np.repeat([1.0, -1.0], len(named.lower)), np.tile(near, 2)
+    open_sides = np.concatenate([values.min(axis=0), -values.max(axis=0)]) > best + near
+    places = np.concatenate([named.at_lower, named.at_upper])
+    made = 0
+    while open_sides.any() and made < most:
+        chosen: list[Array] = []
+        left = open_sides.copy()
+        while left.any() and len(chosen) < min(AT_ONCE, most - made):
+            place = places[np.flatnonzero(left)[left.sum() // 2]]
+            chosen.append(place)
+            told = surrogate(place[None])[0]
+            left &= signs * np.tile(told, 2) > best + near
+            left[np.all(places == place, axis=1)] = False
+        runs.named += runs(np.array(chosen))
+        made += len(chosen)
+        open_sides = left
 
 
 def _horizon(study: Study, gap: Array) -> float:

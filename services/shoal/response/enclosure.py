@@ -51,17 +51,14 @@ def looked_at(study: Study, surrogate: Surrogate, error: Array) -> Looked:
 
 
 def foretold(study: Study, _: Surrogate, found: Extremes, error: Array) -> Enclosure:
-    """Bounds on both sides of what a surrogate foretells: what the runs at its extremes attain at least, and at most.
+    """Bounds that runs attain, and outer ones by what a surrogate foretells at its extremes.
 
-    error: of the surrogate at runs that it had not seen, (columns,). Inner bounds take the place of attained ones.
+    error: of the surrogate at runs that it had not seen, (columns,)
     """
-    values, margin = study.runs.values, SAFETY * error
-    missed = SAFETY * found.doubt
-    lower = np.minimum(values.min(axis=0), found.lower + margin)
-    upper = np.maximum(values.max(axis=0), found.upper - margin)
-    low = np.minimum(lower, found.lower - margin - missed)
-    high = np.maximum(upper, found.upper + margin + missed)
-    width = study.largest(np.maximum(upper - lower, 0.0), values)
+    values, margin = study.runs.values, SAFETY * (error + found.doubt)
+    lower, upper = values.min(axis=0), values.max(axis=0)
+    low, high = np.minimum(lower, found.lower - margin), np.maximum(upper, found.upper + margin)
+    width = study.widths(values)
     beyond = np.maximum(lower - low, high - upper)
     return Enclosure(lower, upper, low, high, np.divide(beyond, width, out=np.zeros_like(beyond), where=width > 0))
 

@@ -145,9 +145,10 @@ class Inputs:
     @property
     def unbounded(self) -> BoolArray:
         """Which germs are normal variables, (parameters,)."""
-        return np.array([self._recurrence(k) is HERMITE for k in range(len(self))], dtype=bool)
+        return np.array([self.recurrence(k) is HERMITE for k in range(len(self))], dtype=bool)
 
-    def _recurrence(self, k: int) -> Recurrence:
+    def recurrence(self, k: int) -> Recurrence:
+        """Of the polynomials that are orthonormal under the measure of one parameter's germ."""
         return HERMITE if self._standard(k) else self.parameters[k].marginal.basis
 
     def values(self, germs: Array) -> dict[str, Array]:
@@ -219,11 +220,11 @@ class Inputs:
 
     def highest(self, degree: int) -> tuple[int, ...]:
         """The highest degree of each parameter's polynomials up to this one: few observations carry few."""
-        return tuple(min(degree, len(self._recurrence(k).a), len(self._recurrence(k).b) - 1) for k in range(len(self)))
+        return tuple(min(degree, len(self.recurrence(k).a), len(self.recurrence(k).b) - 1) for k in range(len(self)))
 
     def polynomials(self, k: int, germs: Array, degree: int) -> Array:
         """Those of one parameter at its germs, (runs,), from degree 0, (runs, degree + 1)."""
-        return self._recurrence(k)(germs, degree)
+        return self.recurrence(k)(germs, degree)
 
     def basis(self, germs: Array, terms: Terms) -> Array:
         """Every product of polynomials at every germ, (runs, terms)."""
@@ -253,7 +254,7 @@ class Inputs:
     @cached_property
     def _alike(self) -> list[tuple[Recurrence, list[int]]]:
         """Parameters in a row that have the same polynomials."""
-        each = [self._recurrence(k) for k in range(len(self))]
+        each = [self.recurrence(k) for k in range(len(self))]
         groups = [list(group) for _, group in groupby(range(len(each)), lambda k: id(each[k]))]
         return [(each[group[0]], group) for group in groups]
 

@@ -41,11 +41,13 @@ class Recurrence:
 
 
 HIGHEST = 40
-"""Degree to which recurrences are known."""
-_k = np.arange(HIGHEST + 1, dtype=float)
-LEGENDRE = Recurrence(np.zeros(HIGHEST + 1), np.divide(_k**2, 4 * _k**2 - 1))
+"""Degree to which recurrences of measures are computed, and of polynomials that are fitted."""
+CLASSICAL = 128
+"""Degree to which those in closed form are known."""
+_k = np.arange(CLASSICAL + 1, dtype=float)
+LEGENDRE = Recurrence(np.zeros(CLASSICAL + 1), np.divide(_k**2, 4 * _k**2 - 1))
 """For the uniform measure on [-1, 1]."""
-HERMITE = Recurrence(np.zeros(HIGHEST + 1), _k.copy())
+HERMITE = Recurrence(np.zeros(CLASSICAL + 1), _k.copy())
 """For the standard normal measure (probabilists' Hermite polynomials)."""
 
 

@@ -40,6 +40,12 @@ class Answer:
     boxes: Boxes | None = None
 
     @property
+    def drawn(self) -> Array:
+        """Of random parameters: the answers of runs that are drawn from their distributions, (runs, columns)."""
+        values = self.runs.values
+        return values if self.found.drawn is None else values[len(values) - self.found.drawn :]
+
+    @property
     def bounded(self) -> Bounds | Boxes | None:
         """What has a horizon and a gap."""
         return self.bounds or self.boxes
@@ -111,7 +117,7 @@ def _statistics(study: Study, found: Found) -> Statistics:
     runs = study.runs
     told = sampled = of_runs(runs.values, found.indices, len(study.inputs))
     if isinstance(found.surrogate, Expansion):
-        told = of_expansion(found.surrogate, study.inputs, found.error, runs.evaluations, study.seed)
+        told = of_expansion(found.surrogate, study.inputs, found.error, len(runs.germs), study.seed)
         if found.linked is not None:
             told = _over(told, found.linked, study)
         if found.errors is not None:

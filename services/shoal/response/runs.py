@@ -42,7 +42,8 @@ class Runs:
     """A model with a memory: call it with germs.
 
     most: runs that it may make; progress: is told after every call how many there are; controls: runs all over the box
-    that test a surrogate
+    that test a surrogate; named: runs at the arguments of its extremes, which attain the bounds; aside: runs that were
+    set aside
     """
 
     model: Model
@@ -55,6 +56,8 @@ class Runs:
     _values: list[Array] = field(default_factory=list)
     _good: list[BoolArray] = field(default_factory=list)
     controls: int = 0
+    named: int = 0
+    aside: int = 0
 
     def __call__(self, germs: Array) -> int:
         """Make the runs at these germs that have not been made; how many they are.
@@ -83,8 +86,8 @@ class Runs:
         self._good.append(answers.good)
         self.repeated += answers.repeated
         self.why = self.why or answers.why
-        if self.failed == self.evaluations:
-            raise ComputationError(f"all {self.evaluations} runs failed: {self.why}")
+        if self.failed == sum(map(len, self._germs)):
+            raise ComputationError(f"all {self.failed} runs failed: {self.why}")
         if self.progress is not None:
             self.progress(self.evaluations)
         return len(fresh)
@@ -97,6 +100,11 @@ class Runs:
             if not len(beside) or np.min(np.max(np.abs(beside - germ), axis=1)) > SAME:
                 kept.append(germ)
         return np.array(kept).reshape(-1, germs.shape[1])
+
+    def set_aside(self) -> None:
+        """Forget all runs but their number, where they do not suit the method that goes on."""
+        self.aside, self.why = self.evaluations, ""
+        self._germs, self._values, self._good = [], [], []
 
     def part(self, which: BoolArray) -> Runs:
         """Some of the good runs, (runs,), for fits to fewer of them."""
@@ -113,17 +121,17 @@ class Runs:
     @property
     def evaluations(self) -> int:
         """Runs made, those that failed among them."""
-        return sum(map(len, self._germs))
+        return self.aside + sum(map(len, self._germs))
 
     @property
     def own(self) -> int:
-        """Runs made but for those of control."""
-        return self.evaluations - self.controls
+        """Runs made but for those of control and those at the extremes of a surrogate of cycles."""
+        return self.evaluations - self.controls - self.named
 
     @property
     def failed(self) -> int:
         """Runs that failed and went on failing with smaller steps."""
-        return self.evaluations - int(sum(good.sum() for good in self._good))
+        return int(sum(np.sum(~good) for good in self._good))
 
     @property
     def germs(self) -> Array:

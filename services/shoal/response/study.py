@@ -160,7 +160,8 @@ class Found:
     quantiles: that take the place of those of the runs, (levels, columns);
     errors: within which mean and deviation lie with 95 % confidence, (columns,) each;
     coarse: columns whose statistics are those of the runs, because the surrogate is not good enough there, (columns,);
-    linked: what tells some columns better than the surrogate; looked: its bounds, where the method knows them
+    linked: what tells some columns better than the surrogate; looked: its bounds, where the method knows them;
+    drawn: of the last runs so many alone are drawn from the distributions, None: all are
     """
 
     why: str
@@ -174,6 +175,7 @@ class Found:
     errors: tuple[Array, Array] | None = None
     linked: Linked | None = None
     looked: Looked | None = None
+    drawn: int | None = None
 
 
 Method = Callable[[Study], Found]

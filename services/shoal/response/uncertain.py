@@ -164,7 +164,7 @@ def uncertain(
             else:
                 found = judge(passed, machine, inputs, _reach(inputs, when, gap, seed, most), **how)
                 shared = answer.found.indices is not None
-                judged.append(crosschecked(found, machine, answer.runs.values, shared=shared))
+                judged.append(crosschecked(found, machine, answer.drawn, shared=shared))
         if allocate:
             allocation = _allocated(judged[0], machine, costs or {}, TARGET if target is None else target, most, how)
     except TimeIsUpError:

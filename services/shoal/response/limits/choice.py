@@ -13,10 +13,11 @@ from shoal.errors import InputError
 from shoal.response.kept import TimeIsUpError
 from shoal.response.limits.counted import contradiction
 from shoal.response.limits.estimate import Estimate, weighted
-from shoal.response.limits.form import SHARES, DesignPoint, design_points, distinct
-from shoal.response.limits.importance import Sample, adapted, sample
+from shoal.response.limits.form import APART, SHARES, DesignPoint, design_points, distinct
+from shoal.response.limits.importance import Sample, adapted, controlled, sample
 from shoal.response.limits.margins import Margins, least
 from shoal.response.limits.subset import Levels, subset
+from shoal.response.limits.surface import Surface, fit_surface
 from shoal.response.runs import TooManyRunsError
 from shoal.trajectory import Array
 
@@ -28,29 +29,37 @@ STARTS = 6
 """Searches for design points."""
 DIFFERENT = 0.8
 """Cosine below which two runs beyond a limit lie in different directions."""
+STARTED = 3.0
+"""Distance at which searches on a response surface begin along every axis."""
+MANY = 2000
+"""Places of each level of subset simulation on a response surface."""
 ROUNDS = 10
-"""Of looking for further design points, and how many directions are looked in."""
+"""Of looking for further design points with runs."""
+FAIR = 0.05
+"""Error of a response surface near the limit, as a share of the margins there, up to which its design points are those
+of the model: smooth limits stay below 0.02, those with edges or many valleys above 0.07."""
 ASIDE = 128
+"""Where it is larger: directions in which runs look for further places beyond the limit,"""
 REACH = 2.0
-"""Beyond the nearest one, in these directions."""
+"""so far beyond the nearest design point."""
 MOST_POINTS = 30
 """Design points that are looked for."""
 SEVERAL = 3
 """Design points from which on a search that has not ended may have missed some."""
 SEEN = 25
 """Runs beyond the limit, of those drawn all around, that tell the probability whether or not points were missed."""
-FIRST = 0.3
+FIRST = 0.35
 """Share of the runs of importance sampling that its proposals are fitted to."""
 LEAST = 0.3
 """Coefficient of variation that subset simulation has at least."""
-FOR_POINTS = 0.2
-"""Share of the runs that design points may take."""
+FOR_POINTS, MORE_POINTS = 0.1, 0.2
+"""Share of the runs that confirm design points, twice; and that look for them where a response surface is no help."""
 COARSE = 0.15
 """Coefficient of variation above which the estimate is told to be coarse."""
 PLAIN = 0.1
 """Share of the runs that are drawn from the distributions: design points are where a search looks, these are not."""
 DISAGREE = 4.0
-"""Standard deviations by which it may say more than importance sampling and it still be chance."""
+"""Standard deviations by which two independent estimates may differ and it still be chance."""
 
 
 @dataclass(frozen=True)
@@ -87,9 +96,9 @@ def by_importance(margins: Margins, seed: int) -> Passing:
     points = form(margins, seed).points
     if not points:
         return Passing(_nothing("no design point"), [], "importance sampling", "no design point was found to sample at")
-    found = sample(margins, adapted(points, None), margins.left, seed + 1)
+    found = sample(margins, adapted(points, []), margins.left, seed + 1)
     why = f"{found.estimate.why} around {_told(points)}"
-    return Passing(found.estimate, points, why, _weak(found, [], points, ended=True))
+    return Passing(found.estimate, points, why, _weak(found.estimate, [found], points, ended=True))
 
 
 def by_subset(margins: Margins, seed: int) -> Passing:
@@ -109,7 +118,7 @@ def monte_carlo(margins: Margins, seed: int) -> Passing:
 
 
 def auto(margins: Margins, seed: int) -> Passing:
-    """Subset simulation looks for the places, design points are sought there, importance sampling at them tells.
+    """Importance sampling, whose proposals and control variate are found on a response surface of the runs before.
 
     Where the limit is passed often, plain sampling is as good.
     """
@@ -118,60 +127,98 @@ def auto(margins: Margins, seed: int) -> Passing:
     if rough.probability >= OFTEN:
         found = monte_carlo(margins, seed + 1)
         return Passing(found.estimate, found.points, f"{found.why}, as the limit is passed often", found.doubt)
-    points, ended = _sought(margins, pilot, seed + 1)
-    if not points:
-        return Passing(rough, [], rough.why)
-    known = Sample(pilot.places, pilot.margins, np.ones(len(pilot.places))) if len(pilot.places) else None
     plain = np.random.default_rng(seed + 4).standard_normal((int(PLAIN * margins.left), len(margins.inputs)))
     rows = margins(plain)
-    first = sample(margins, adapted(points, known), int(FIRST * margins.left), seed + 2)
-    last = sample(margins, adapted(points, first), margins.left, seed + 3)
+    searched = _search(margins, pilot, [], seed + 10)
+    if not searched.points:
+        return Passing(rough, [], rough.why, contradiction(rough, rows), len(rows))
+    first = sample(margins, adapted(searched.proposed, searched.beyond), int(FIRST * margins.left), seed + 2)
+    searched = _search(margins, pilot, searched.points, seed + 20)
+    proposal = adapted(searched.proposed, [*searched.beyond, first], first)
+    last = sample(margins, proposal, margins.left, seed + 3)
     estimate = last.estimate
-    doubt = contradiction(estimate, rows) or _weak(last, [first], points, ended=ended)
-    why = f"{estimate.why} around {_told(points)}"
-    if doubt or known is None:
-        return Passing(estimate, points, why, doubt, len(rows))
+    if searched.surface is not None:
+        estimate = controlled(last, proposal, searched.surface.chances, seed + 5)
     # Subset simulation may lose a place as well, but it finds none that is not there.
-    chance = DISAGREE * math.hypot(max(rough.coefficient, LEAST), estimate.coefficient)
-    if not estimate.probability or math.log(rough.probability / estimate.probability) > chance:
-        doubt = f"importance sampling says {estimate.probability:.1e} and subset simulation {rough.probability:.1e}"
-        return Passing(estimate, points, why, doubt, len(rows))
-    agrees = f"; {rough.why} says {rough.probability:.1e}"
-    return Passing(estimate, points, why + agrees, "", len(rows))
+    doubt = (
+        contradiction(estimate, rows)
+        or _weak(estimate, [last, first], searched.points, ended=searched.ended)
+        or _disagree(estimate, "importance sampling", first.estimate, 0.0, "its first runs", both=True)
+        or _disagree(estimate, "importance sampling", rough, LEAST, "subset simulation")
+    )
+    why = f"{estimate.why} around {_told(searched.points)}; {rough.why} says {rough.probability:.1e}"
+    return Passing(estimate, searched.points, why, doubt, len(rows))
 
 
-def _sought(margins: Margins, pilot: Levels, seed: int) -> tuple[list[DesignPoint], bool]:
-    """Design points below all runs that pass the limit, as far as they are known; those runs where there are none.
+@dataclass(frozen=True)
+class Searched:
+    """Where a limit is passed.
 
-    And whether the search has ended of itself: nothing that is known is left to explain, or nothing new was found.
+    points: design points by runs; proposed: these and those of the response surface; beyond: samples of the failure
+    domain; surface: None where there are too few runs for one; ended: whether nothing that is known is left to explain
     """
-    parameters = len(margins.inputs)
-    whole = margins.most
-    margins.most = margins.evaluations + int(FOR_POINTS * margins.left)
-    first = pilot.first[: len(pilot.first) // 5]
-    points = design_points(margins, np.vstack([np.zeros((1, parameters)), _apart(pilot.places), _apart(first)]))
-    known = pilot.places
-    if margins.left > ASIDE:
-        radius = REACH + min((abs(point.beta) for point in points), default=3.0)
-        ways = np.random.default_rng(seed).standard_normal((ASIDE, parameters))
-        ways *= radius / np.linalg.norm(ways, axis=1)[:, None]
-        known = np.concatenate([known, ways[least(margins(ways)) < 0]])
-    ended, step = False, 2 * parameters + len(SHARES)
+
+    points: list[DesignPoint]
+    proposed: list[DesignPoint]
+    beyond: list[Sample]
+    surface: Surface | None
+    ended: bool
+
+
+def _search(margins: Margins, pilot: Levels, known: list[DesignPoint], seed: int) -> Searched:
+    """Look on the response surface of all runs so far, then with a share of the runs at the places found there.
+
+    Runs beyond the limit that no design point explains start further searches. known: points that runs have confirmed
+    """
+    parameters, whole = len(margins.inputs), margins.most
+    samples = [Sample(pilot.places, pilot.margins, np.ones(len(pilot.places)))] if len(pilot.places) else []
+    foretold, surface = list[DesignPoint](), fit_surface(margins.inputs, *margins.known)
+    fair = surface is not None and surface.error <= FAIR
+    if surface is not None:
+        free, axes = surface.margins, STARTED * np.eye(parameters)
+        many = subset(free, MANY, seed)
+        foretold = design_points(free, np.vstack([np.zeros((1, parameters)), axes, -axes, _apart(many.places)]))
+        if len(many.places):
+            samples.insert(0 if fair else 1, Sample(many.places, many.margins, np.ones(len(many.places))))
+    margins.most = margins.evaluations + int((FOR_POINTS if fair or known else MORE_POINTS) * margins.left)
+    points, starts, ended = known, _fresh(foretold[:STARTS], known, parameters), False
+    if not fair:
+        starts = np.zeros((0, parameters))
+        if not known:
+            first = pilot.first[: len(pilot.first) // 5]
+            starts = np.concatenate([np.zeros((1, parameters)), _apart(pilot.places), _apart(first)])
+            points, starts = design_points(margins, starts), starts[:0]
+        if not known and margins.left > ASIDE:
+            radius = REACH + min((abs(point.beta) for point in points), default=3.0)
+            ways = np.random.default_rng(seed + 1).standard_normal((ASIDE, parameters))
+            margins(ways * (radius / np.linalg.norm(ways, axis=1)[:, None]))
     for _ in range(ROUNDS):
-        hidden = known
-        for point in points:
+        places, rows = margins.known
+        # What a surface makes of places where no run has been is not known.
+        hidden = places[least(rows) < 0] if pilot.places.size else np.zeros((1 - bool(points), parameters))
+        for point in (*points, *(foretold if fair else ())):
             hidden = hidden[hidden @ point.normal < point.beta]
-        starts = _apart(hidden)
-        if not len(starts) or margins.left < step * len(starts) or len(points) >= MOST_POINTS:
-            ended = not len(starts)
+        starts = np.concatenate([starts, _apart(hidden)])
+        ended = not len(starts)
+        if ended or len(points) >= MOST_POINTS or margins.left < (2 * parameters + len(SHARES)) * len(starts):
             break
-        more = distinct([*points, *design_points(margins, starts)])
+        more = distinct([*points, *design_points(margins, starts)])[:MOST_POINTS]
+        ended = len(more) == len(points) and margins.left > 0
         if len(more) == len(points):
-            ended = margins.left >= step * len(starts)
             break
-        points = more[:MOST_POINTS]
+        points, starts = more, starts[:0]
     margins.most = whole
-    return points or [_where(place) for place in _apart(pilot.places)], ended
+    points = points or [_where(place) for place in _apart(pilot.places)]
+    proposed = distinct([*points, *foretold])[: STARTS + 2 * parameters] if fair else points
+    return Searched(points, proposed, samples, surface, ended or fair)
+
+
+def _fresh(points: list[DesignPoint], known: list[DesignPoint], parameters: int) -> Array:
+    """Places of points that are apart from those that are known, (places, parameters)."""
+    fresh = [
+        point.place for point in points if all(np.linalg.norm(point.place - other.place) > APART for other in known)
+    ]
+    return np.array(fresh).reshape(-1, parameters)
 
 
 WAYS: dict[str, Callable[[Margins, int], Passing]] = {
@@ -205,7 +252,7 @@ def _apart(places: Array) -> Array:
     """The places nearest to the origin that lie in different directions, (starts, parameters)."""
     chosen: list[Array] = []
     for place in places[np.argsort(np.linalg.norm(places, axis=1))]:
-        unit = place / np.linalg.norm(place)
+        unit = place / max(np.linalg.norm(place), 1e-300)
         if all(unit @ other / np.linalg.norm(other) < DIFFERENT for other in chosen):
             chosen.append(place)
         if len(chosen) == STARTS - 1:
@@ -234,19 +281,33 @@ def _told(points: list[DesignPoint]) -> str:
     return f"{what} (beta {betas})"
 
 
-def _weak(last: Sample, before: list[Sample], points: list[DesignPoint], *, ended: bool) -> str:
+def _weak(estimate: Estimate, samples: list[Sample], points: list[DesignPoint], *, ended: bool) -> str:
     """Empty, or why runs around design points do not tell the probability. ended: whether the search for these did."""
-    estimate, sure = last.estimate, [point for point in points if point.converged]
+    sure = [point for point in points if point.converged]
     if not estimate.probability and sure:
-        return f"there is {_told(sure)}, but none of {len(last.rows)} runs around it passes the limit"
+        return f"there is {_told(sure)}, but none of {len(samples[0].rows)} runs around it passes the limit"
     seen = 0
-    for rows, probability in itertools.chain.from_iterable(one.outside for one in (last, *before)):
+    for rows, probability in itertools.chain.from_iterable(one.outside for one in samples):
         if doubt := contradiction(estimate, rows, outside=probability):
             return doubt
         seen += int((rows < 0).any(axis=1).sum())
     if not ended and len(points) >= SEVERAL and seen < SEEN:
         return f"there may be more design points than the {len(points)} that were found"
     return _coarse(estimate)
+
+
+def _disagree(one: Estimate, name: str, other: Estimate, least: float, told: str, *, both: bool = False) -> str:
+    """Empty, or that another, independent estimate is larger than chance allows, or, for both, smaller.
+
+    least: coefficient of variation of the other at least; told: what it is
+    """
+    if not other.probability:
+        return ""
+    chance = DISAGREE * math.hypot(max(other.coefficient, least), one.coefficient) if one.probability else 0.0
+    away = math.log(other.probability / one.probability) if one.probability else math.inf
+    if away <= chance and not (both and -away > chance):
+        return ""
+    return f"{name} says {one.probability:.1e} and {told} {other.probability:.1e}"
 
 
 def _coarse(estimate: Estimate) -> str:

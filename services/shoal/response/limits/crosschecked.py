@@ -26,7 +26,7 @@ def crosschecked(judged: Judged, machine: Machine, values: Array, *, shared: boo
     values: (runs, columns); shared: whether runs share parameters with others, as those that tell indices do
     """
     columns = _columns(machine, judged.limit)
-    if judged.passing is None or columns is None:
+    if judged.passing is None or columns is None or not len(values):
         return judged
     share = 2 / (len(judged.inputs) + 2) if shared else 1.0
     margins = judged.limit.margin(values[:, columns])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -31,6 +31,8 @@ class Margins:
     failed: int = 0
     repeated: int = 0
     why: str = ""
+    _places: list[Array] = field(default_factory=list)
+    _rows: list[Array] = field(default_factory=list)
 
     def __call__(self, places: Array) -> Array:
         """Raises TooManyRunsError before it makes more than `most` runs, InputError."""
@@ -43,7 +45,15 @@ class Margins:
         self.why = self.why or answers.why
         if self.progress is not None:
             self.progress(self.evaluations)
-        return np.where(answers.good[:, None], answers.values, np.nan)
+        rows = np.where(answers.good[:, None], answers.values, np.nan)
+        self._places.append(places)
+        self._rows.append(rows)
+        return rows
+
+    @property
+    def known(self) -> tuple[Array, Array]:
+        """Places and margins of all runs so far, (runs, parameters) and (runs, instants)."""
+        return np.concatenate(self._places), np.concatenate(self._rows)
 
     @property
     def left(self) -> int:

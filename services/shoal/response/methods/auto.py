@@ -11,6 +11,7 @@ from shoal.response.course import UnsuitableError, watch
 from shoal.response.methods import chaos, long_time, sampling
 from shoal.response.methods.bounds import bounds
 from shoal.response.methods.nested import nested
+from shoal.response.methods.quadrature import quadrature
 from shoal.response.methods.time_warp import TimeWarp
 from shoal.response.methods.torus import Torus
 from shoal.response.study import Found, Study
@@ -29,11 +30,17 @@ UNEVEN = 0.02
 
 
 def auto(study: Study) -> Found:
-    """Intervals: `bounds`, `time-warp` or `torus`. Distributions: chaos or else quasi-random runs. Both: `nested`."""
+    """Choose by what is known of the parameters and by how the answers depend on them.
+
+    Intervals: `bounds`, `time-warp` or `torus`. Distributions: quadrature, chaos or else quasi-random runs. Both:
+    `nested`.
+    """
     if not study.inputs.random.any():
         return _intervals(study)
     if study.inputs.mixed:
         return nested(study)
+    if (smooth := quadrature(study)) is not None:
+        return smooth
     found = chaos.grown(study, study.count or chaos.RUNS)
     assert found.error is not None
     off = chaos.shares(study, found.error)

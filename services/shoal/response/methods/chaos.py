@@ -66,7 +66,7 @@ def grown(study: Study, fair: int) -> Found:
     found = told.plain
     degree = int(found.terms.sum(axis=1).max(initial=0))
     kind = "regularised " if len(found.terms) > len(runs.germs) / SHARE else ""
-    why = f"{kind}polynomial chaos of degree {degree} fitted to {runs.evaluations} runs{told.why}"
+    why = f"{kind}polynomial chaos of degree {degree} fitted to {len(runs.germs)} runs{told.why}"
     errors = moments.errors(study, told, lambda part: told.again(part, _fitted, _chosen))
     return Found(why, found, told.left_out, errors=errors, linked=told if told.links else None)
 

@@ -1,7 +1,7 @@
 """Bounds at long times: a surrogate of cycles, grown until it foretells runs that it has not seen.
 
-At long times every instant has extremal points of its own, which one run each cannot attain. The bounds are those that
-the surrogate foretells at the points that it names, less its error, which runs tell that it has not seen.
+At long times every instant has extremal points of its own. The surrogate names them; runs there attain the bounds, and
+its error, which runs tell that it has not seen, widens the outer ones.
 """
 
 from __future__ import annotations
@@ -88,7 +88,8 @@ def _grown(study: Study, make: Callable[[Watch], LongTime], seen: Watch) -> Foun
             worse = 0 if found is None or share < HELPS * found.share else worse + 1
             if found is None or share < found.share:
                 found = Found(why, surrogate, error, foretold=True, share=share)
-            if share <= wanted or study.degree or worse == 2 or study.runs.own > 2 * study.fair:
+            dear = study.gap is None and study.runs.own > 2 * study.fair
+            if share <= wanted or study.degree or worse == 2 or dear:
                 break
             degree += 1
             while _carried(parameters, degree + 1, len(seen.germs)):
@@ -115,9 +116,9 @@ def _controlled(study: Study, found: Found) -> Found:
 
 
 def _share(study: Study, error: Array) -> float:
-    """What an error leaves between both sides of a bound, as a share of the width: the largest."""
+    """What an error leaves between attained and outer bounds, as a share of the width: the largest."""
     width = study.widths(study.runs.values)
-    return float(np.divide(2 * SAFETY * error, width, out=np.zeros_like(width), where=width > 0).max())
+    return float(np.divide(SAFETY * error, width, out=np.zeros_like(width), where=width > 0).max())
 
 
 def _carried(parameters: int, degree: int, runs: int) -> bool:

@@ -1,0 +1,113 @@
+"""Gauss quadrature of smooth answers of few random parameters: spectral convergence, where sampling needs thousands.
+
+The rule of n points in each parameter integrates polynomials of degree 2 n - 1 exactly; the expansion through its
+points is the pseudo-spectral projection (Xiu, Efficient collocational approach for parametric uncertainty analysis,
+Communications in Computational Physics 2, 2007). The number of points is doubled until two rules agree.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import eigh_tridiagonal
+
+from shoal.errors import InputError
+from shoal.response.expansion import Expansion
+from shoal.response.inputs import Inputs
+from shoal.response.kept import TimeIsUpError
+from shoal.response.polynomials import Recurrence, tensor
+from shoal.response.statistics import SURE
+from shoal.response.study import Found, Study
+from shoal.trajectory import Array
+
+LEVELS = {1: (8, 16, 32, 64, 128), 2: (6, 12, 24)}
+"""Points in each parameter, by the number of parameters: 248 and 756 runs at most."""
+NEGLIGIBLE = 1e-8
+"""Weight below which a point, more than five standard deviations out, needs no run: it takes part in mean and variance
+with its weight, and values as far out may be impossible."""
+CONVERGED = 1e-4
+"""Difference of two rules, as a share of the standard deviation, that is good enough."""
+ROUGH = 10.0
+"""So many times that share runs that are drawn may be off, as those of other methods that are good enough are."""
+CONTROLS = 64
+"""Runs that are drawn from the distributions: points of a rule may all miss a part of them."""
+
+
+def gauss(recurrence: Recurrence, count: int) -> tuple[Array, Array]:
+    """Nodes and weights of the measure of some orthonormal polynomials, (count,) each (Golub and Welsch, 1969)."""
+    nodes, vectors = eigh_tridiagonal(recurrence.a[:count], np.sqrt(recurrence.b[1:count]))
+    return nodes, vectors[0] ** 2
+
+
+def quadrature(study: Study) -> Found | None:
+    """An expansion, or None where the rules do not agree or do not foretell drawn runs; then all are set aside."""
+    levels = LEVELS.get(len(study.inputs), ())
+    if study.degree or study.count or not study.inputs.random.all() or not levels:
+        return None
+    try:
+        found = _agreeing(study, levels)
+    except InputError:
+        # What far points state may be impossible; drawn runs seldom lie there.
+        found = None
+    if found is None:
+        study.runs.set_aside()
+    return found
+
+
+def _agreeing(study: Study, levels: tuple[int, ...]) -> Found | None:
+    """Raises InputError."""
+    inputs, runs = study.inputs, study.runs
+    before: Expansion | None = None
+    for count in levels:
+        if min(inputs.highest(count)) < count or runs.left < count ** len(inputs) + CONTROLS:
+            return None
+        made = runs.evaluations
+        germs, weights = _rule(inputs, count)
+        try:
+            runs.all(germs)
+        except TimeIsUpError:
+            if before is None:
+                raise
+            std = np.sqrt(before.variance)
+            return Found("broken off when the time was up", before, std, errors=(std, std), drawn=0)
+        if runs.failed:
+            return None
+        values = runs.values[made:] if made else runs.values
+        found = _projected(inputs, germs, weights, values, count)
+        if before is not None:
+            std, apart = np.sqrt(found.variance), np.abs(found.mean - before.mean)
+            apart = np.maximum(apart, np.abs(std - np.sqrt(before.variance)))
+            if np.all(apart <= CONVERGED * study.largest(std, values)):
+                return _controlled(study, found, apart, count)
+        before = found
+    return None
+
+
+def _controlled(study: Study, found: Expansion, apart: Array, count: int) -> Found | None:
+    """By runs that the rule has not seen. Raises InputError."""
+    inputs, runs, made = study.inputs, study.runs, study.runs.evaluations
+    runs.all(inputs.sobol(CONTROLS, study.seed))
+    if runs.failed:
+        return None
+    values = runs.values[made:]
+    missed = np.sqrt(np.mean((found(runs.germs[made:]) - values) ** 2, axis=0))
+    if np.any(missed > ROUGH * CONVERGED * study.largest(np.sqrt(found.variance), values)):
+        return None
+    error = apart + SURE * missed / np.sqrt(CONTROLS)
+    why = f"Gauss quadrature with {count} points in each parameter; {CONTROLS} of the runs are drawn to control it"
+    return Found(why, found, missed, errors=(error, error), drawn=CONTROLS)
+
+
+def _rule(inputs: Inputs, count: int) -> tuple[Array, Array]:
+    """Germs, (runs, parameters), and weights, (runs,), of the tensor product."""
+    rules = [gauss(inputs.recurrence(k), count) for k in range(len(inputs))]
+    axes = np.meshgrid(*(nodes for nodes, _ in rules), indexing="ij")
+    shares = np.meshgrid(*(weights for _, weights in rules), indexing="ij")
+    weight = np.prod([share.ravel() for share in shares], axis=0)
+    some = weight > NEGLIGIBLE
+    return np.stack([axis.ravel() for axis in axes], axis=1)[some], weight[some]
+
+
+def _projected(inputs: Inputs, germs: Array, weights: Array, values: Array, count: int) -> Expansion:
+    terms = tensor(len(inputs), count - 1)
+    basis = inputs.basis(germs, terms)
+    return Expansion(inputs, terms, basis.T @ (weights[:, None] * values), np.zeros(values.shape[1]))
