@@ -18,6 +18,8 @@ from shoal.identification.conclude import Wishes
 from shoal.identification.measure import Windows
 from shoal.pictures.answer import Answer
 from shoal.response import Response, uncertain
+from shoal.response.limits import read_limits
+from shoal.response.read import parameters
 from shoal.response.stated import load_study
 from shoal.response.worst import Worst, require_case, worst
 from shoal.scene import Scene, load_scene
@@ -120,8 +122,10 @@ def responded(study: str, values: Mapping[str, Any]) -> tuple[Response, list[Wor
     """A study of uncertain parameters with its worst cases, if any. Raises InputError, ComputationError."""
     stated = load_study(study)
     machine = stated.machine().with_values(values)
-    require_case(stated.worst_of, stated.limit, machine)
-    found = uncertain(machine, **stated.asked())
+    asked = stated.asked()
+    limits = read_limits(asked["limits"], asked["requirements"], machine)
+    require_case(stated.worst_of, limits, machine, parameters(asked["vary"], machine))
+    found = uncertain(machine, **asked)
     try:
         return found, worst(found, stated.worst_of)
     except InputError:

@@ -17,7 +17,7 @@ from shoal.identification import load_problem, measure
 from shoal.identification.problem import built_in_problems
 from shoal.identification.recording.reading import YAML, described, read
 from shoal.identification.recording.source import FileSource
-from shoal.response.limits import limit
+from shoal.response.limits import read_limits
 from shoal.response.posterior import is_source
 from shoal.response.read import parameters
 from shoal.response.stated import KEY, built_in_studies, load_study
@@ -94,8 +94,7 @@ def _check_study(document: Path) -> None:
     if any("empirical(" in text or is_source(text) for text in study.vary):
         raise InputError(f"{document.name}: {KEY}: vary: a file of observations cannot be kept with a study")
     parameters(asked["vary"], scene)
-    for text in asked["limits"]:
-        limit(text, scene)
+    read_limits(asked["limits"], asked["requirements"], scene)
 
 
 KINDS = {

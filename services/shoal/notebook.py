@@ -132,6 +132,7 @@ def uncertain(
     count: int | None = None,
     most: int = 20_000,
     limits: Sequence[str] = (),
+    requirements: Sequence[str] = (),
     limit_method: str = "auto",
     limit_runs: int = 5_000,
     allocate: bool = False,
@@ -149,11 +150,12 @@ def uncertain(
     `--vary` takes; times: instants [s], else the scene's own; gap: between outer and attained bounds, as a share of the
     largest width, that must be reached; tolerance: error [m] of the model; correlations: of pairs of random parameters;
     degree, count: of a method that has one; most: runs that may be made; verify: estimate mesh and step errors of
-    extremal runs; limits: what must not happen, such as "B.y < -1.2"; limit_method: auto, form, importance, subset or
-    monte-carlo; limit_runs: for each of their probabilities; allocate: look for the widest tolerances that keep the
-    limit, with `costs` (by path, else 1) of tightening each; target: probability of passing it that is allowed, else
-    0.001; checkpoint: file that keeps the runs, from which the same study goes on; time_limit [s]: after which it ends
-    with what is known; progress: is told how many runs there are. Raises InputError, ComputationError.
+    extremal runs; limits: what must not happen, such as "B.y < -1.2"; requirements: what must hold, such as
+    "B.y > -1.2"; limit_method: auto, form, importance, subset or monte-carlo; limit_runs: for each of their
+    probabilities; allocate: look for the widest tolerances that keep the limit, with `costs` (by path, else 1) of
+    tightening each; target: probability of passing it that is allowed, else 0.001; checkpoint: file that keeps the
+    runs, from which the same study goes on; time_limit [s]: after which it ends with what is known; progress: is told
+    how many runs there are. Raises InputError, ComputationError.
     """
     from shoal.response import uncertain
 
@@ -170,6 +172,7 @@ def uncertain(
         count=count,
         most=most,
         limits=limits,
+        requirements=requirements,
         limit_method=limit_method,
         limit_runs=limit_runs,
         allocate=allocate,

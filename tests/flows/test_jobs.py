@@ -55,5 +55,5 @@ def test_a_worst_case_that_there_is_not_is_told_before_the_study(
 ) -> None:
     monkeypatch.setattr(jobs, "uncertain", lambda *_, **__: pytest.fail("the study was made first"))
     (tmp_path / "study.yaml").write_text(STUDY.format(worst=worst))
-    with pytest.raises(InputError, match=r"worst: .* is neither a limit of the study \(A.y > 0.5\) nor"):
+    with pytest.raises(InputError, match=r"worst-of: .* is neither a limit of the study \(A.y > 0.5\) nor"):
         jobs.responded(str(tmp_path / "study.yaml"), {})

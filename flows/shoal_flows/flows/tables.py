@@ -65,16 +65,17 @@ def of_response(found: Response) -> str:
     evidence = f"{found.status}, {found.errors.brief}; {found.evaluations} runs; {found.why}"
     said = [evidence, found.message, found.mixes_starts]
     for one in found.limits:
-        kept = {True: f"kept {looked_at(one.times)}", False: "passed", None: "not decided"}[one.kept]
+        event = one.limit.event
+        kept = f"{one.limit.verdict(one.kept)}{f' {looked_at(one.times)}' if one.kept else ''}"
         told = (
             kept
             if one.passing is None
-            else f"passed {looked_at(one.times)} with probability {one.passing.estimate.told}"
+            else f"{event} {looked_at(one.times)} with probability {one.passing.estimate.told}"
         )
         if one.between is not None:
             least, largest = (each.told for each in one.estimates)
-            told = f"passed {looked_at(one.times)} with a probability between {least} and {largest}"
-        said.append(f"limit {one.limit.text}: {told}")
+            told = f"{event} {looked_at(one.times)} with a probability between {least} and {largest}"
+        said.append(f"{one.limit.title}: {told}")
     return "\n\n".join([shown, *(one for one in said if one)])
 
 

@@ -58,7 +58,7 @@ def _figures(run: Run, found: Response) -> None:
                 steps = ((round(1000 * found.times[k]), float(values[k])) for k in some)
                 run.series(f"{marker}.{quantity}/{name}", steps)
     for k, judged in enumerate(found.limits):
-        run.params({f"limit.{k}": judged.limit.text})
+        run.params({f"limit.{k}": judged.limit.title})
         if judged.passing is not None:
             run.metric(f"final/limit.{k}/probability", judged.passing.estimate.probability)
         elif judged.between is not None:

@@ -142,7 +142,8 @@ class Uncertain(OfScene):
     states; correlations: [path, path, value] of random ones; times: instants [s], else the scene's own; gap:
     between outer and attained bounds, as a share of the width, to be reached; tolerance: error [m] of the model
     verify: estimate mesh and step errors of extremal runs; most: runs that may be made
-    limits: what must not happen, such as "B.y < -1.2"; limit_method, limit_runs: for their probabilities
+    limits: what must not happen, such as "B.y < -1.2"; requirements: what must hold, such as "B.y > -1.2";
+    limit_method, limit_runs: for their probabilities
     allocate: look for the widest tolerances that keep the limit, with `costs` by path and the `target` probability
     time_limit: in s, after which it ends with what is known
     """
@@ -161,6 +162,7 @@ class Uncertain(OfScene):
     count: Annotated[int, limited("count")] | None = None
     most: Annotated[int, limited("most", le=20_000)] = 2_000
     limits: Annotated[list[Annotated[str, Field(max_length=200)]], Field(max_length=10)] = []
+    requirements: Annotated[list[Annotated[str, Field(max_length=200)]], Field(max_length=10)] = []
     limit_method: BuiltIn = "auto"
     limit_runs: Annotated[int, limited("limit_runs", le=20_000)] = 5_000
     allocate: bool = False
@@ -171,7 +173,7 @@ class Uncertain(OfScene):
     @property
     def runs(self) -> int:
         """That may be made, or nearly so."""
-        return self.most + (len(self.limits) + 4 * self.allocate) * self.limit_runs
+        return self.most + (len(self.limits) + len(self.requirements) + 4 * self.allocate) * self.limit_runs
 
     def arguments(self) -> dict[str, Any]:
         """With correlations as the library has them."""

@@ -10,7 +10,7 @@ import click
 from shoal.commands import options
 from shoal.commands.options import Out, Times, Values
 from shoal.commands.stated import stated
-from shoal.errors import check_trusted
+from shoal.errors import ComputationError, InputError, check_trusted
 
 if TYPE_CHECKING:
     from shoal.response import Response
@@ -62,7 +62,15 @@ def _ways() -> str:
     "limits",
     multiple=True,
     metavar='"MARKER.QUANTITY < NUMBER"',
-    help="What must not happen (repeatable); also JOINT.force, .torque, energy, .strain and so on (docs/uncertain.md).",
+    help="What must not happen (repeatable), the opposite of --require; also JOINT.force, .torque, energy, .strain and "
+    "so on (docs/uncertain.md).",
+)
+@click.option(
+    "--require",
+    "requirements",
+    multiple=True,
+    metavar='"MARKER.QUANTITY > NUMBER"',
+    help="What must hold (repeatable): the opposite of --limit.",
 )
 @click.option("--limit-method", cls=options.LateHelp, told=_ways, default="auto", show_default=True, metavar="NAME")
 @click.option(
@@ -122,6 +130,7 @@ def uncertain(
     degree: int | None,
     count: int | None,
     limits: tuple[str, ...],
+    requirements: tuple[str, ...],
     limit_method: str,
     limit_runs: int,
     allocate: bool,
@@ -142,12 +151,14 @@ def uncertain(
 ) -> None:
     """How SCENE may move if some of its fields are intervals or distributions.
 
-    Intervals give bounds that runs attain, distributions give means, deviations, quantiles and Sobol indices. A limit
-    tells what must not happen: with intervals whether it can, with distributions how probable it is. SCENE may be a
+    Intervals give bounds that runs attain, distributions give means, deviations, quantiles and Sobol indices. A
+    requirement states what must hold, a limit what must not happen: with intervals the answer is whether it can be
+    violated, with distributions how probable that is. SCENE may be a
     YAML `uncertain: {scene: ..., vary: ..., ...}` that states these options.
     """
     from shoal.pictures import files
     from shoal.response import uncertain
+    from shoal.response.limits import read_limits
     from shoal.response.read import correlations, parameters, prices
     from shoal.response.worst import require_case
     from shoal.scene import load_scene
@@ -155,7 +166,7 @@ def uncertain(
 
     wanted = load_scene(scene).with_values(values)
     known, correlated = parameters(vary, wanted), correlations(pairs)
-    require_case(worst_of, limits, wanted)
+    require_case(worst_of, read_limits(limits, requirements, wanted), wanted, known)
     with screen.working(f"{wanted.name}: uncertain response") as tell:
         screen.compile_for(engine, [1, 2], wanted)
         response = uncertain(
@@ -173,6 +184,7 @@ def uncertain(
             seed=seed,
             most=most,
             limits=limits,
+            requirements=requirements,
             limit_method=limit_method,
             limit_runs=limit_runs,
             allocate=allocate,
@@ -184,17 +196,20 @@ def uncertain(
         )
     if out is not None:
         files.response(response, out)
+    screen.show(response.to_json(), as_json, lambda: tables.response_table(response))
     if worst_file is not None:
         _save_worst(response, worst_file, worst_of)
-    screen.show(response.to_json(), as_json, lambda: tables.response_table(response))
     check_trusted(response.ok, response.message)
 
 
 def _save_worst(response: Response, file: Path, of: str) -> None:
-    """One scene; those of several limits get numbers. Raises InputError, ComputationError."""
+    """One scene; those of several limits get numbers. Raises ComputationError, also where there is no worst case."""
     from shoal.response.worst import worst
 
-    cases = worst(response, of)
+    try:
+        cases = worst(response, of)
+    except InputError as error:
+        raise ComputationError(f"{error}; {file} is not written") from None
     for k, case in enumerate(cases):
         path = file if len(cases) == 1 else file.with_stem(f"{file.stem}-{k + 1}")
         case.save(path)

@@ -48,5 +48,5 @@ def probability(found: Judged) -> Figure:
     if seen:
         axes.legend()
     chances = " to ".join(one.told for one in estimates)
-    headline(figure, f"{found.limit.text} happens with probability {chances}, {looked_at(found.times)}")
+    headline(figure, f"{found.limit.excluded} happens with probability {chances}, {looked_at(found.times)}")
     return figure

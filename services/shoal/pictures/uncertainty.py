@@ -87,13 +87,13 @@ def _limit(one: Judged) -> list[str]:
     if one.between is not None:
         lower, upper = one.between.interval
         chances = " to ".join(each.told for each in one.estimates)
-        return [one.limit.text, chances, f"{lower:.3g} to {upper:.3g}", how]
+        return [one.limit.title, chances, f"{lower:.3g} to {upper:.3g}", how]
     if one.passing is None:
-        says = {True: f"kept {looked_at(one.times)}", False: "passed", None: "not decided"}[one.kept]
+        says = f"{one.limit.verdict(one.kept)}{f' {looked_at(one.times)}' if one.kept else ''}"
         error = f" ({one.errors.brief})" if one.errors.estimates else ""
-        return [one.limit.text, says, f"{one.margin:.3g} {one.limit.unit}{error}", how]
+        return [one.limit.title, says, f"{one.margin:.3g} {one.limit.unit}{error}", how]
     low, high = one.interval
-    return [one.limit.text, one.passing.estimate.told, f"{low:.3g} to {high:.3g}", how]
+    return [one.limit.title, one.passing.estimate.told, f"{low:.3g} to {high:.3g}", how]
 
 
 def _cases(found: Response) -> list[Worst]:
@@ -157,8 +157,8 @@ def _pictures(found: Response) -> list[Drawn]:
 
 
 def _passage(one: Judged) -> Drawn:
-    words = "The probability that the limit has been passed at an instant looked at, by each of them."
-    return Drawn(f"passage-{one.limit.text}", probability(one), f"{words[:-1]}: {one.limit.text}.", words)
+    words = f"The probability that {one.limit.excluded} has happened at an instant looked at, by each of them."
+    return Drawn(f"passage-{one.limit.text}", probability(one), words, f"{words[:-1]}: {one.limit.title}.")
 
 
 def _allocation(found: Response) -> list[list[str]]:
@@ -183,13 +183,13 @@ def _allocated(found: Response) -> list[str]:
 
 def _remarks(found: Response) -> list[str]:
     remarks = [f"{found.mixes_starts}."] if found.mixes_starts else []
-    remarks += [f"{one.limit.text}: {one.passing.why}." for one in found.limits if one.passing is not None]
-    remarks += [f"{one.limit.text}: {one.note}." for one in found.limits if one.note]
+    remarks += [f"{one.limit.title}: {one.passing.why}." for one in found.limits if one.passing is not None]
+    remarks += [f"{one.limit.title}: {one.note}." for one in found.limits if one.note]
     for one in found.limits:
         if one.between is not None:
             for side, at in (("least", one.between.at_lower), ("most", one.between.at_upper)):
                 values = ", ".join(f"{name} = {value:.5g}" for name, value in at.items())
-                remarks.append(f"{one.limit.text}: {side} probable with {values}.")
+                remarks.append(f"{one.limit.title}: {side} probable with {values}.")
     if found.repeated or found.failed:
         remarks.append(f"{found.repeated} runs were repeated with smaller steps; {found.failed} failed all the same.")
     if (found.bounds or found.boxes) is not None and found.horizon < found.times[-1]:

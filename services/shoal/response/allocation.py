@@ -57,7 +57,7 @@ class Allocation:
     that of the stated ones; interval: in which that probability lies with 95 % confidence
     """
 
-    limit: str
+    required: str
     inputs: Inputs
     factors: Array
     effects: Array
@@ -105,7 +105,7 @@ class Allocation:
         return dict(
             plain(
                 {
-                    "limit": self.limit,
+                    "require": self.required,
                     "status": "ok" if self.ok else "not-met",
                     "message": self.message,
                     f"{told}_stated": self.stated,
@@ -148,11 +148,13 @@ def cheapest(weights: Array, costs: Array, room: float, most: Array) -> Array:
     not limit its factor.
     """
     weight = np.maximum(weights, 0.0)
+    with np.errstate(divide="ignore"):
+        # In logarithms, as weights may be next to nothing.
+        alone = 0.5 * (np.log(costs) - np.log(weight))
+    ends = math.log(TIGHTEST), np.log(most)
 
     def factors(logarithm: float) -> Array:
-        pull = math.exp(logarithm) * weight
-        free = np.sqrt(np.divide(costs, pull, out=np.full(len(costs), np.inf), where=pull > 0))
-        return np.asarray(np.clip(free, TIGHTEST, most))
+        return np.asarray(np.clip(np.exp(np.clip(alone - 0.5 * logarithm, *ends)), TIGHTEST, most))
 
     def beyond(logarithm: float) -> float:
         return float(weight @ factors(logarithm)) - room
@@ -246,8 +248,8 @@ def _pull(model: Model, inputs: Inputs, germ: Array, factors: Array) -> tuple[Ar
 
 
 def passed(text: str) -> ComputationError:
-    """What to say of a limit that no tolerances keep."""
-    return ComputationError(f"allocate: limit {text} is passed by the middle values, whatever the tolerances")
+    """What to say of a requirement that no tolerances keep."""
+    return ComputationError(f"allocate: {text} does not hold at the middle values, whatever the tolerances")
 
 
 def costs_of(texts: Mapping[str, float], inputs: Inputs) -> Array:

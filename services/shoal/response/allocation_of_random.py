@@ -180,7 +180,7 @@ def of_random(
     model, seed = watched(machine, limit), how["seed"]
     middle = model(inputs.values(_germs(inputs, np.zeros(int((~inputs.random).sum())), None)))
     if least(middle.values)[0] <= 0:
-        raise passed(limit.text)
+        raise passed(limit.required)
     chance = stated.estimates[-1].probability
     factors, spent, effects = np.ones(len(inputs)), 1, np.zeros(len(inputs))
     if chance > 0:
@@ -220,7 +220,7 @@ def of_random(
         told.append(confirmed)
     best = min(told, key=lambda one: (not one.kept(target), float(costs @ (1 / one.factors))))
     return Allocation(
-        limit=limit.text,
+        required=limit.required,
         inputs=inputs,
         factors=best.factors,
         effects=effects,

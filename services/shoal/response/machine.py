@@ -28,6 +28,11 @@ ALONE = 32
 """So many runs of a call at most, that fail with smaller steps too, are made one by one."""
 
 
+def quantities(dimensions: int) -> tuple[str, ...]:
+    """What a study tells of every marker."""
+    return ("x", "y", "angle") if dimensions == 2 else ("x", "y", "z")
+
+
 @dataclass(frozen=True)
 class Machine:
     """Call it with path -> values. Columns: instants, markers and quantities, in this order.
@@ -54,7 +59,7 @@ class Machine:
     @property
     def quantities(self) -> tuple[str, ...]:
         """What is told of every marker."""
-        return ("x", "y", "angle") if self.scene.dimensions == 2 else ("x", "y", "z")
+        return quantities(self.scene.dimensions)
 
     @property
     def columns(self) -> tuple[int, int, int]:
@@ -129,7 +134,32 @@ class Machine:
                 return {}, str(error)
             halves = [self._run(scene, values, half) for half in np.array_split(lanes, 2)]
             return halves[0][0] | halves[1][0], halves[0][1] or halves[1][1]
+        except InputError as error:
+            raise InputError(f"{error}{self._impossible(scene, values, lanes)}") from None
         return self._lanes(motion, scene, those, lanes), motion.message
+
+    def _impossible(self, scene: Scene, values: Mapping[str, Array], lanes: IntArray) -> str:
+        """Which values are refused, in words; empty where all of these lanes are, or none alone. By bisection."""
+
+        def refused(some: IntArray) -> bool:
+            try:
+                self.engine.simulate_many(scene, {path: at[some] for path, at in values.items()}, self.times)
+            except UnstableStepError:
+                return False
+            except InputError:
+                return True
+            return False
+
+        left, accepted = lanes, False
+        while len(left) > 1:
+            first, second = np.array_split(left, 2)
+            if refused(first):
+                left = first
+            else:
+                left, accepted = second, True
+        if not refused(left) or (not accepted and refused(lanes[-1:])):
+            return ""
+        return f" (with {', '.join(f'{path} = {at[left[0]]:.6g}' for path, at in values.items())}; others are accepted)"
 
     def _alone(self, values: Mapping[str, Array], lanes: IntArray) -> dict[int, _Lane]:
         """Some lanes one after the other: then `auto` takes another integrator where its first choice fails."""

@@ -133,6 +133,18 @@ class Runs:
         """Runs that failed and went on failing with smaller steps."""
         return int(sum(np.sum(~good) for good in self._good))
 
+    def describe_failed(self) -> str:
+        """Between which values of the parameters runs have failed, and those of the first, in words."""
+        bad = np.concatenate(self._germs)[~np.concatenate(self._good)]
+        if not len(bad):
+            return ""
+        values = self.inputs.named(bad)
+        ends = zip(self.inputs.names, values.min(axis=0), values.max(axis=0), values[0], strict=True)
+        return ", ".join(
+            f"{name} {low:.6g} to {high:.6g} (first {one:.6g})" if low < high else f"{name} {one:.6g}"
+            for name, low, high, one in ends
+        )
+
     @property
     def germs(self) -> Array:
         """Of the good runs, (runs, parameters)."""

@@ -69,6 +69,7 @@ class Stated(Base):
     degree: Annotated[int, limited("degree")] | None = None
     count: Annotated[int, limited("count")] | None = None
     limit: Annotated[list[str], _texts("limit")] = []
+    require: Annotated[list[str], _texts("require")] = []
     limit_method: str = "auto"
     limit_runs: Annotated[int, limited("limit_runs")] = 5_000
     allocate: bool = False
@@ -99,6 +100,7 @@ class Stated(Base):
             "correlations": correlations(self.correlate),
             "costs": prices(self.cost),
             "limits": self.limit,
+            "requirements": self.require,
             "most": self.runs,
         }
 

@@ -34,7 +34,7 @@ from shoal.response.finer import repeated
 from shoal.response.inputs import Correlations, Inputs, Parameter
 from shoal.response.kept import Keep, TimeIsUpError
 from shoal.response.limits import MOST as LIMIT_RUNS
-from shoal.response.limits import Judged, judge, limit
+from shoal.response.limits import Judged, judge, read_limits
 from shoal.response.limits.choice import get_way
 from shoal.response.limits.crosschecked import allowing, crosschecked
 from shoal.response.limits.judge import Reach, require, watched
@@ -78,6 +78,7 @@ def uncertain(
     seed: int = 0,
     most: int = MOST,
     limits: Sequence[str] = (),
+    requirements: Sequence[str] = (),
     limit_method: str = "auto",
     limit_runs: int = LIMIT_RUNS,
     allocate: bool = False,
@@ -95,7 +96,7 @@ def uncertain(
     degree, count: of a method that has one; tolerance: error [m] that the markers of the middle machine may have, for
     which the cheapest model is found (runs that attain bounds are then repeated on a finer mesh); verify: estimate mesh
     and step errors of extremal runs; most: runs that may be made; limits: what must not happen, such as "B.y < -1.2";
-    limit_method: one of `WAYS`; limit_runs: for each of them;
+    requirements: what must hold, such as "B.y > -1.2"; limit_method: one of `WAYS`; limit_runs: for each of them;
     allocate: look for the widest tolerances that keep the limit, with `costs` (by path, else 1) of tightening each;
     target: probability of passing it that is allowed, else `TARGET`; checkpoint: file that keeps the runs, from which
     the same study goes on; time_limit [s]: after which, compiling aside, it ends with what is known; progress: is told
@@ -108,7 +109,7 @@ def uncertain(
         if given and not allocate:
             raise InputError(f"{name}: belongs to allocate, the search for the widest tolerances; ask for that too")
     for name, stated in {"limit_method": limit_method != "auto", "limit_runs": limit_runs != LIMIT_RUNS}.items():
-        if stated and not limits:
+        if stated and not limits and not requirements:
             raise InputError(f"{name}: belongs to a limit, whose probability it is for; state one, such as B.y < -1.2")
     end = None if time_limit is None else clock.now() + time_limit
     wanted = as_scene(scene)
@@ -116,9 +117,10 @@ def uncertain(
     inputs = Inputs(parameters(vary, wanted), correlations)
     starts = Tally(Stated.of(wanted, [path for one in inputs.parameters for path in one.factors]))
     get_way(limit_method)
-    if allocate and len(limits) != 1:
-        raise InputError(f"allocate: needs one limit, found {len(limits)}; state it with --limit")
-    when, asked = sampling_times(wanted, times), [limit(text, wanted) for text in limits]
+    when, asked = sampling_times(wanted, times), read_limits(limits, requirements, wanted)
+    if allocate and len(asked) != 1:
+        raise InputError(f"allocate: needs one limit, found {len(asked)}; state it with --require or --limit")
+    costs_of(costs or {}, inputs)
     if tolerance is not None:
         wanted = _modelled(wanted, inputs, tolerance, when, engine, asked)
     keep = _keep(wanted, when, engine, checkpoint, end)
@@ -302,14 +304,15 @@ def _allocated(
         worst = int(lower.argmin())
         return Reached(float(outer.min()), float(lower[worst]), germs[worst], evaluations)
 
-    return of_intervals(wanted.text, told, inputs, least, prices, widest)
+    return of_intervals(wanted.required, told, inputs, least, prices, widest)
 
 
 def _status(answer: Answer, gap: float | None, rejected: str, judged: Sequence[Judged]) -> tuple[str, str]:
     """ok, or what speaks against believing the answer, and why."""
     runs, bounds = answer.runs, answer.bounded
     if runs.failed:
-        return "failed-runs", f"{runs.failed} of {runs.evaluations} runs failed even with smaller steps: {runs.why}"
+        failed = f"{runs.failed} of {runs.evaluations} runs failed even with smaller steps: {runs.why}"
+        return "failed-runs", f"{failed}; they have {runs.describe_failed()}"
     if rejected:
         return "model-rejected", rejected
     if answer.boxes is not None and math.isfinite(answer.horizon):

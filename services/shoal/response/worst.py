@@ -10,9 +10,11 @@ import numpy as np
 
 from shoal.engines import get_engine
 from shoal.errors import InputError
-from shoal.response.limits import Shown, limit
+from shoal.response.inputs import Parameter
+from shoal.response.limits import Shown
 from shoal.response.limits.judge import show
 from shoal.response.limits.limit import Limit
+from shoal.response.machine import quantities
 from shoal.response.result import Response
 from shoal.scene import Scene
 from shoal.scene.edited import as_yaml
@@ -51,12 +53,19 @@ def worst(found: Response, of: str = "") -> list[Worst]:
     return [_case(found, text, shown) for text, shown in cases.items()]
 
 
-def require_case(of: str, limits: Sequence[str], scene: Scene) -> None:
+def require_case(of: str, limits: Sequence[Limit], scene: Scene, parameters: Sequence[Parameter]) -> None:
     """Raises InputError for what can be no case of a study of a scene with limits, before it is made."""
-    limits = [limit(text, scene).text for text in limits]
-    marker, _, side = _parts(of)
-    if of and of not in limits and (side not in SIDES or marker not in scene.markers):
-        raise _no_case(of, limits)
+    texts = [one.text for one in limits]
+    if not of or of in texts:
+        return
+    marker, quantity, side = _parts(of)
+    known = quantities(scene.dimensions)
+    if side not in SIDES or marker not in scene.markers or quantity not in known:
+        raise _no_case(of, texts, scene)
+    if random := [one.name for one in parameters if one.marginal.random]:
+        raise InputError(
+            f"worst-of: {of} is a bound, and {random[0]} has a distribution, so that there are none; name a limit"
+        )
 
 
 def _parts(of: str) -> tuple[str, str, str]:
@@ -66,10 +75,12 @@ def _parts(of: str) -> tuple[str, str, str]:
     return marker, quantity, side
 
 
-def _no_case(of: str, limits: Iterable[str]) -> InputError:
+def _no_case(of: str, limits: Iterable[str], scene: Scene) -> InputError:
+    stated = ", ".join(limits) or "there are none"
+    known = f"MARKER one of {', '.join(scene.markers)} and QUANTITY one of {', '.join(quantities(scene.dimensions))}"
     return InputError(
-        f"worst: {of!r} is neither a limit of the study ({', '.join(limits) or 'there are none'}) nor, of intervals, "
-        "MARKER.QUANTITY.lower or .upper"
+        f"worst-of: {of!r} is neither a limit of the study ({stated}) nor, of intervals, MARKER.QUANTITY.lower or "
+        f".upper, with {known}"
     )
 
 
@@ -98,7 +109,7 @@ def _bound(found: Response, of: str) -> tuple[str, Shown]:
     """The run that attains a bound, where that lies farthest out."""
     marker, rest, side = _parts(of)
     if found.bounds is None or side not in SIDES or marker not in found.markers or rest not in found.quantities:
-        raise _no_case(of, (one.limit.text for one in found.limits))
+        raise _no_case(of, (one.limit.text for one in found.limits), found.stated)
     above = side == "upper"
     bound = found.column(marker, rest, getattr(found.bounds, side))
     arguments = found.column(marker, rest, (found.bounds.at_upper if above else found.bounds.at_lower).T).T

@@ -91,7 +91,11 @@ class Between:
         """Plain data."""
         sides = {}
         for name, one, at in (("lower", self.lower, self.at_lower), ("upper", self.upper, self.at_upper)):
-            told = {key: value for key, value in one.to_json().items() if key not in ("limit", "unit", "method")}
+            told = {
+                key: value
+                for key, value in one.to_json().items()
+                if key not in ("limit", "require", "stated", "unit", "method")
+            }
             sides[f"at_{name}"] = {"parameters": at, **told}
         (least, largest), (lower, upper), (lower_outer, upper_outer) = self.estimates, self.interval, self.outer
         return {
@@ -160,13 +164,15 @@ class Judged:
             return f"the run shown passes it between the instants looked at, at {self.shown.between:.4g} s: state more"
         if not self.estimates or not min(one.probability for one in self.estimates) > NEARLY_SURE:
             return ""
-        return f"{self.limit.text} states what must not happen, and nearly always does: is it what is required instead?"
+        if self.limit.is_required:
+            return f"{self.limit.text} is required, and hardly ever holds: is it what must not happen (--limit)?"
+        return f"{self.limit.text} states what must not happen, and nearly always does: is it required (--require)?"
 
     @property
     def doubt(self) -> str:
         """Why it should not be believed, empty if it may be."""
         found = self.reason_to_doubt
-        return f"limit {self.limit.text}: {found}" if found else ""
+        return f"{self.limit.title}: {found}" if found else ""
 
     @property
     def reason_to_doubt(self) -> str:
@@ -191,7 +197,13 @@ class Judged:
 
     def to_json(self) -> dict[str, Any]:
         """An entry of `limits` in what `shoal uncertain --json` prints."""
-        found: dict[str, Any] = {"limit": self.limit.text, "unit": self.limit.unit, "method": self.way}
+        found: dict[str, Any] = {
+            "limit": self.limit.excluded,
+            "require": self.limit.required,
+            "stated": self.limit.stated,
+            "unit": self.limit.unit,
+            "method": self.way,
+        }
         if self.between is not None:
             found |= self.between.to_json()
         elif self.passing is not None:

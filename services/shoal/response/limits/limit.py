@@ -1,13 +1,15 @@
-"""What must not happen: MARKER.QUANTITY < NUMBER, or >; of a joint, or of the whole machine as well.
+"""Limits, which must not be passed, and requirements, which must hold: MARKER.QUANTITY < NUMBER, or >.
 
-Margins are positive as long as it does not.
+Of a joint, or of the whole machine as well. A limit states what must not happen, a requirement the opposite. Margins
+are positive as long as the quantity lies on the side that is required.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -26,7 +28,8 @@ _EXPRESSION = re.compile(r"^\s*(abs\()?\s*(?:([^\s()<>]+)\.)?(\w+)\s*(\))?\s*(<|
 class Limit:
     """Passed where a quantity lies beyond a bound: above it or below it, its absolute value or itself.
 
-    place: a marker, a joint, or empty for the whole machine, as the quantity has it
+    text: as the user states it; place: a marker, a joint, or empty for the whole machine, as the quantity has it;
+    above: whether it is passed above the bound; stated: as what must not happen, or as what is required
     """
 
     text: str
@@ -35,6 +38,44 @@ class Limit:
     above: bool
     bound: float
     absolute: bool = False
+    stated: Literal["limit", "requirement"] = "limit"
+
+    @property
+    def is_required(self) -> bool:
+        """Whether the text is what must hold, not what must not happen."""
+        return self.stated == "requirement"
+
+    @property
+    def required(self) -> str:
+        """What must hold."""
+        return self.text if self.is_required else self._on_side(not self.above)
+
+    @property
+    def excluded(self) -> str:
+        """What must not happen."""
+        return self._on_side(self.above) if self.is_required else self.text
+
+    @property
+    def title(self) -> str:
+        """The name of a limit or a requirement with the side that is required, for what is said of it."""
+        if self.is_required:
+            return f"requirement {self.text}"
+        return f"limit {self.text} (must not happen; required: {self.required})"
+
+    def verdict(self, kept: bool | None) -> str:
+        """What intervals have shown: whether no values of the parameters pass it, None where that is not decided."""
+        if self.is_required:
+            return {True: "holds", False: "is violated", None: "is not decided"}[kept]
+        return {True: "is kept", False: "is passed", None: "is not decided"}[kept]
+
+    @property
+    def event(self) -> str:
+        """What has a probability, as a verb."""
+        return "is violated" if self.is_required else "is passed"
+
+    def _on_side(self, above: bool) -> str:
+        named = f"{self.place}.{self.quantity}" if self.place else self.quantity
+        return f"{f'abs({named})' if self.absolute else named} {'>' if above else '<'} {self.bound:.12g}"
 
     @property
     def unit(self) -> str:
@@ -78,25 +119,50 @@ class Limit:
             return self.margin(dynamic.along(motion, scene, values, self.quantity, self.place).T)
         except InputError as error:
             # What mechanics says of load cells it says of channels.
-            raise InputError(f"limit: {self.text}: {str(error).removeprefix('channels: ')}") from None
+            field = "require" if self.is_required else "limit"
+            raise InputError(f"{field}: {self.text}: {str(error).removeprefix('channels: ')}") from None
 
 
 def limit(text: str, scene: Scene) -> Limit:
-    """What a user wrote. Raises InputError."""
+    """What must not happen, as a user writes it. Raises InputError."""
+    return _read("limit", text, scene)
+
+
+def requirement(text: str, scene: Scene) -> Limit:
+    """What must hold, as a user writes it: the limit that its opposite is. Raises InputError."""
+    found = _read("require", text, scene)
+    return replace(found, above=not found.above, stated="requirement")
+
+
+def read_limits(limits: Iterable[str], requirements: Iterable[str], scene: Scene) -> list[Limit]:
+    """Limits, then requirements. Raises InputError, also for a text that is stated as both."""
+    found = [limit(text, scene) for text in limits]
+    for text in requirements:
+        one = requirement(text, scene)
+        if any(one.text == other.text and not other.is_required for other in found):
+            raise InputError(
+                f"require: {one.text}: is stated as a limit, too, which says that it must not happen; leave one out"
+            )
+        found.append(one)
+    return found
+
+
+def _read(field: str, text: str, scene: Scene) -> Limit:
+    """Raises InputError."""
     found = _EXPRESSION.match(text)
     if found is None or bool(found[1]) != bool(found[4]):
-        raise InputError(f"limit: {text!r} is not {FORM}")
+        raise InputError(f"{field}: {text!r} is not {FORM}")
     _, place, quantity, _, sign, number = found.groups()
     try:
         check(place or "", quantity, scene)
     except InputError as error:
-        raise InputError(f"limit: {text}: {error}") from None
+        raise InputError(f"{field}: {text}: {error}") from None
     try:
         bound = float(number)
     except ValueError:
         bound = float("nan")
     if not np.isfinite(bound):
-        raise InputError(f"limit: {text}: {number!r} is no finite number; write {FORM}")
+        raise InputError(f"{field}: {text}: {number!r} is no finite number; write {FORM}")
     return Limit(text.strip(), place or "", quantity, sign == ">", bound, bool(found[1]))
 
 

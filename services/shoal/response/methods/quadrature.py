@@ -21,9 +21,8 @@ from shoal.trajectory import Array
 
 LEVELS = {1: (8, 16, 32, 64, 128), 2: (6, 12, 24)}
 """Points in each parameter, by the number of parameters: 248 and 756 runs at most."""
-NEGLIGIBLE = 1e-8
-"""Weight below which a point, more than five standard deviations out, needs no run: it takes part in mean and variance
-with its weight, and values as far out may be impossible."""
+NEGLIGIBLE = 1e-12
+"""Weight below which a point needs no run: about seven standard deviations out, where values may be impossible."""
 CONVERGED = 1e-4
 """Difference of two rules, as a share of the standard deviation, that is good enough."""
 ROUGH = 10.0
@@ -35,7 +34,7 @@ CONTROLS = 64
 def gauss(recurrence: Recurrence, count: int) -> tuple[Array, Array]:
     """Nodes and weights of the measure of some orthonormal polynomials, (count,) each (Golub and Welsch, 1969)."""
     nodes, vectors = eigh_tridiagonal(recurrence.a[:count], np.sqrt(recurrence.b[1:count]))
-    return nodes, vectors[0] ** 2
+    return np.asarray(nodes, dtype=float), np.asarray(vectors[0] ** 2, dtype=float)
 
 
 def quadrature(study: Study) -> Found | None:

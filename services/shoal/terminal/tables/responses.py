@@ -107,7 +107,7 @@ def _by_model(response: Response) -> str:
 
 def _limit(judged: Judged) -> None:
     """What is told of a limit, and the values that show it."""
-    title, shown, at = f"limit {judged.limit.text}", judged.shown, looked_at(judged.times)
+    title, shown, at = judged.limit.title, judged.shown, looked_at(judged.times)
     if judged.between is not None:
         _between(title, judged, judged.between)
         how = "most probably with"
@@ -115,18 +115,19 @@ def _limit(judged: Judged) -> None:
         estimate = judged.passing.estimate
         lower, upper = judged.interval
         screen.say(
-            f"{title}: is passed {at} with probability {estimate.told}, with 95 % confidence between {lower:.3g} "
-            f"and {upper:.3g}",
+            f"{title}: {judged.limit.event} {at} with probability {estimate.told}, with 95 % confidence between "
+            f"{lower:.3g} and {upper:.3g}",
             f"  by {judged.passing.why}; {judged.evaluations} runs",
             style="bold",
         )
         how = "most probably with"
     else:
-        undecided = f"is kept by all runs {at}, which proves nothing"
+        undecided = f"{judged.limit.verdict(True)} in all runs {at}, which proves nothing"
         undecided = f"is not decided {at}: {judged.reason_to_doubt}" if judged.hidden else undecided
-        says = {True: f"is kept for all values {at}", False: "is passed", None: undecided}
+        holds = f"{judged.limit.verdict(True)} for all values {at}"
+        says = {True: holds, False: judged.limit.verdict(False), None: undecided}
         screen.say(f"{title}: {says[judged.kept]}", style="bold")
-        how = "passed with" if judged.kept is False else "nearest with"
+        how = f"{judged.limit.event.removeprefix('is ')} with" if judged.kept is False else "nearest with"
     if judged.note:
         screen.say(f"  {judged.note}")
     if shown is not None:
@@ -139,7 +140,7 @@ def _between(title: str, judged: Judged, found: Between) -> None:
     """Two probabilities and the interval values that they are told at."""
     (least, largest), (lower, upper) = judged.estimates, found.interval
     screen.say(
-        f"{title}: is passed {looked_at(judged.times)} with a probability between {least.told} and "
+        f"{title}: {judged.limit.event} {looked_at(judged.times)} with a probability between {least.told} and "
         f"{largest.told}, with 95 % confidence between {lower:.3g} and {upper:.3g}",
         style="bold",
     )
@@ -151,7 +152,8 @@ def _between(title: str, judged: Judged, found: Between) -> None:
 def _allocation(found: Allocation) -> None:
     """Tolerances that keep the limit, and what tightening the stated ones does."""
     told = found.to_json()
-    table = screen.table(f"tolerances that keep {found.limit}", "", "stated", "found", "factor", "effect of 1 %")
+    title = f"tolerances with which {found.required} holds"
+    table = screen.table(title, "", "stated", "found", "factor", "effect of 1 %")
     for name, one in told["parameters"].items():
         numbers = one["tolerance_stated"], one["tolerance"], one["factor"], one["effect_of_one_per_cent"]
         table.add_row(escape(name), *(f"{x:.3g}" for x in numbers))
