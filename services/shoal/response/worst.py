@@ -88,7 +88,8 @@ def _case(found: Response, of: str, shown: Shown) -> Worst:
     if shown.status != "ok":
         raise InputError(f"worst: the run of {of} is not borne out: {shown.message}")
     scene = found.stated.with_values(shown.values)
-    about = f"Worst case of {of} for {found.scene}: {shown.margin:.4g} at {shown.time:g} s."
+    titles = {one.limit.text: one.limit.title for one in found.limits}
+    about = f"Worst case of {titles.get(of, of)} for {found.scene}: {shown.margin:.4g} at {shown.time:g} s."
     return Worst(of, scene.model_copy(update={"name": f"{found.scene}-worst", "description": about}), shown)
 
 

@@ -64,10 +64,7 @@ def _agreeing(study: Study, levels: tuple[int, ...]) -> Found | None:
         try:
             runs.all(germs)
         except TimeIsUpError:
-            if before is None:
-                raise
-            std = np.sqrt(before.variance)
-            return Found("broken off when the time was up", before, std, errors=(std, std), drawn=0)
+            return _broken_off(before)
         if runs.failed:
             return None
         values = runs.values[made:] if made else runs.values
@@ -76,9 +73,20 @@ def _agreeing(study: Study, levels: tuple[int, ...]) -> Found | None:
             std, apart = np.sqrt(found.variance), np.abs(found.mean - before.mean)
             apart = np.maximum(apart, np.abs(std - np.sqrt(before.variance)))
             if np.all(apart <= CONVERGED * study.largest(std, values)):
-                return _controlled(study, found, apart, count)
+                try:
+                    return _controlled(study, found, apart, count)
+                except TimeIsUpError:
+                    return _broken_off(found)
         before = found
     return None
+
+
+def _broken_off(found: Expansion | None) -> Found:
+    """By the last rule that was finished. Raises TimeIsUpError if there is none."""
+    if found is None:
+        raise TimeIsUpError
+    std = np.sqrt(found.variance)
+    return Found("broken off when the time was up", found, std, errors=(std, std), drawn=0)
 
 
 def _controlled(study: Study, found: Expansion, apart: Array, count: int) -> Found | None:
