@@ -157,7 +157,8 @@ def _pictures(found: Response) -> list[Drawn]:
 
 
 def _passage(one: Judged) -> Drawn:
-    words = f"The probability that {one.limit.excluded} has happened at an instant looked at, by each of them."
+    event = one.limit.event.removeprefix("is ")
+    words = f"The probability that the {one.limit.stated} has been {event} at an instant looked at, by each of them."
     return Drawn(f"passage-{one.limit.text}", probability(one), words, f"{words[:-1]}: {one.limit.title}.")
 
 

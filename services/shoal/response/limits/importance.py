@@ -27,7 +27,7 @@ from scipy import special
 from scipy.cluster import vq
 
 from shoal.response.inputs import BoolArray, IntArray
-from shoal.response.limits.estimate import Estimate, weighted
+from shoal.response.limits.estimate import Estimate, first_passages, weighted
 from shoal.response.limits.form import DesignPoint
 from shoal.response.limits.margins import Margins
 from shoal.trajectory import Array
@@ -229,8 +229,14 @@ def controlled(found: Sample, proposal: Mixture, chances: Callable[[Array], Arra
     if probability <= 0 or variance >= float(covariance[0, 0]):
         return estimate
     deviation = max(math.sqrt(variance) / probability, SURE / np.count_nonzero(beyond))
-    # When the limit is passed first, the runs alone tell.
-    among = np.maximum(estimate.deviation**2 - estimate.coefficient**2, 0.0)
+    # Which part of it is passed up to an instant, the runs alone tell: the variance of a ratio.
+    instants, part = found.rows.shape[1], estimate.passed / estimate.probability
+    first = first_passages(found.rows)
+    inside = first < instants
+    squares = np.cumsum(np.bincount(first[inside], found.weights[inside] ** 2, instants))
+    scatter = (1 - part) ** 2 * squares + part**2 * (squares[-1] - squares)
+    size = (count * estimate.passed) ** 2
+    among = np.divide(scatter, size, out=np.full(instants, np.inf), where=size > 0)
     passed = np.minimum(estimate.passed * (probability / estimate.probability), 1.0)
     why = f"{estimate.why}, with a response surface as control variate,"
     return replace(estimate, passed=passed, deviation=np.sqrt(among + deviation**2), why=why)
