@@ -85,6 +85,50 @@ def test_tables_drawn_at_random_hold_what_was_written(seed: int, tmp_path: Path)
     np.testing.assert_array_equal(found, written[~np.all(np.isnan(written), axis=1)])
 
 
+ABOVE = (
+    "mass A",
+    "multi:",
+    "Export of run 7",
+    "fps{0}240",
+    "mass A{0}",
+    "{0}mass A",
+    "By a tracker, version 6",
+    "",
+    "#c",
+)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_lines_above_the_header_drawn_at_random_are_passed_over(seed: int, tmp_path: Path) -> None:
+    """Titles, the name of a mass, blank lines and settings, with and without a line of units below the names."""
+    rng = np.random.default_rng(seed)
+    separator, ending = str(rng.choice([",", "\t", ";"])), str(rng.choice(["\n", "\r\n"]))
+    names = ["t", "x", "y"]
+    rows = [[f"{x:.4f}" for x in row] for row in np.column_stack([np.arange(5) / 10, rng.normal(size=(5, 2))])]
+    rows[int(rng.integers(5))][1] = ""
+    units = [["s", "mm", "mm"]] * int(rng.integers(2))
+    above = [str(rng.choice(ABOVE)).format(separator) for _ in range(int(rng.integers(1, 5)))]
+    if all(line == "" or line.startswith("#") for line in above):
+        above[0] = "mass A"
+    lines = above + [separator.join(line) for line in (names, *units, *rows)]
+    path = tmp_path / "table.txt"
+    path.write_bytes(ending.join([*lines, ""]).encode())
+    read_back = table.load_table(path)
+    assert list(read_back.frame.columns) == names
+    wanted = np.array([[float(cell or "nan") for cell in row] for row in rows])
+    np.testing.assert_array_equal(np.column_stack([read_back.numbers(name) for name in names]), wanted)
+    assert read_back.rows[0] == len(above) + 2 + len(units)
+    np.testing.assert_array_equal(read_back.frames, np.arange(5))
+    assert (read_back.units is not None) == bool(units)
+
+
+def test_two_lines_that_may_name_the_columns_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "table.csv"
+    path.write_text("A,B,C\nt,x,y\n0,1,2\n1,2,3\n")
+    with pytest.raises(InputError, match="row 2, column 'A': 't' is not a number"):
+        table.load_table(path).numbers("A")
+
+
 def test_a_comma_beside_points_is_no_decimal_mark(tmp_path: Path) -> None:
     """A thousand and two hundred millimetres are not 1.2."""
     with pytest.raises(InputError, match=r"row 2, column 'x': '1,200' is not a number"):

@@ -152,6 +152,8 @@ def _csv(path: Path, data: bytes, columns: list[str] | None) -> Table:
         data = data.replace(b"\r", b"\n")
     data = _SEPARATES.sub(rb"#\g<0>", data, count=1)
     try:
+        if columns is None:
+            data = _without_preamble(data)
         head = _units(_header(_tabbed(data), columns is not None))
         first, skipped, comments = head.first, head.skipped, head.comments
         separator = _separator(first)
@@ -190,6 +192,44 @@ def _csv(path: Path, data: bytes, columns: list[str] | None) -> Table:
     cells = next(csv.reader([head.units], delimiter=separator), [])
     units = of_columns(path, head.unit_row, names, cells) if head.units else None
     return Table(path, frame[filled], rows[filled], decimal, comments, units)
+
+
+def _without_preamble(data: bytes) -> bytes:
+    """Return the text with the lines above its header as comments, where the first line cannot name the columns.
+
+    The header is the last line above the first two rows of numbers, or above their line of units, if it has a word of
+    its own for each column. A first line that has one too stays the header: two of them are ambiguous.
+    """
+    lines = data.split(b"\n")
+    cells = [_cells(line) for line in _tabbed(b"\n".join(lines[:_LOOKED])).split(b"\n")]
+    told = [k for k, line in enumerate(cells) if line]
+    rows = [_are_numbers(cells[k]) and len(cells[k]) > 1 for k in told]
+    begin = next((i for i in range(len(told) - 1) if rows[i] and rows[i + 1]), 0)
+    width = len(cells[told[begin]]) if told else 0
+    above = told[:begin]
+    if above and is_unit_line(cells[above[-1]]) and not _is_header(cells[above[0]], width):
+        above = above[:-1]
+    if len(above) < 2 or len(cells[told[begin + 1]]) != width:
+        return data
+    *preamble, header = above
+    if _is_header(cells[preamble[0]], width) or not _is_header(cells[header], width):
+        return data
+    for k in range(header):
+        lines[k] = b"#" + lines[k] if lines[k].strip() else lines[k]
+    return b"\n".join(lines)
+
+
+def _cells(line: bytes) -> list[str]:
+    """Return the cells of a line, none of a blank one or a comment."""
+    text = line.decode().strip("\r\n ")
+    if not text.strip() or text[0] in "#%":
+        return []
+    return [cell.strip() for cell in next(csv.reader([text], delimiter=_separator(text)), [])]
+
+
+def _is_header(cells: Sequence[str], width: int) -> bool:
+    """Return whether cells name so many columns, each by a word of its own."""
+    return len(cells) == width == len(set(cells)) and all(cells) and not any(_are_numbers([cell]) for cell in cells)
 
 
 def _refuse_preamble(path: Path, data: bytes, named: bool) -> None:

@@ -132,8 +132,8 @@ def test_a_table_of_any_text_is_read_or_refused(tmp_path: Path, text: str) -> No
         ("t,theta,theta\n0,1,1\n", ["'theta'", "twice"]),
         ("0,1\n1,2\n2,3\n", ["no header line", "columns"]),
         (
-            "By a tracker\nmass A\nt,theta\n0,1\n1,2\n",
-            ["no header line: row 1", "row 4 has 2 cells", "row 3 may be it"],
+            "By a tracker\nmass A\nt,theta,theta\n0,1,2\n1,2,3\n",
+            ["no header line: row 1", "row 4 has 3 cells", "row 3 may be it"],
         ),
         ("t,theta\n0,1\n1,-9999\n2,1.1\n3,-9999\n4,1.2\n", ["'theta': -9999 stands 2 times", "1 to 1.2", "empty"]),
         ("t,theta\n0,1\n", ["only 1 samples"]),
