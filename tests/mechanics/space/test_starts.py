@@ -12,6 +12,7 @@ from shoal.mechanics.assembly.space import start
 from shoal.mechanics.assembly.space.values import jacobian
 from shoal.mechanics.simulate import simulate
 from shoal.scene import Scene
+from shoal.trajectory import Status
 
 CRANK, ROD, ANGLE, RATE = 0.3, 1.0, 0.6, 7.0
 
@@ -194,3 +195,40 @@ def test_a_loop_that_no_poses_close_is_given_up_early(monkeypatch: pytest.Monkey
     with pytest.raises(InputError, match="cannot be assembled; no poses near the stated ones close it"):
         start.place_started(Scene.parse(scene, "too short"))
     assert len(asked) < 17 * 30
+
+
+def rounded_pendulum(rng: np.random.Generator, digits: int) -> Scene:
+    """A chain of two masses on bars of known length, whose stated places have so many digits."""
+    places = np.cumsum([rng.normal(size=3) for _ in range(2)], axis=0)
+    lengths = [float(np.linalg.norm(places[0])), float(np.linalg.norm(places[1] - places[0]))]
+    velocities = [np.cross(rng.normal(size=3), places[0])] * 2
+    stated = [[float(f"{x:.{digits}g}") for x in place] for place in places]
+    ends = [{"body": "ground", "point": [0, 0, 0]}, {"body": "M0"}, {"body": "M1"}]
+    return Scene.parse({
+        "name": "rounded", "dimensions": 3, "gravity": [0, 0, -9.81],
+        "bodies": {f"M{k}": {"kind": "point-mass", "mass": 1.0 + k} for k in range(2)},
+        "joints": {f"L{k}": {"kind": "distance", "first": ends[k], "second": ends[k + 1], "length": lengths[k]}
+                   for k in range(2)},
+        "markers": {"T": {"body": "M1"}},
+        "initial": {f"M{k}": {"position": stated[k], "velocity": np.round(velocities[k], digits).tolist()}
+                    for k in range(2)},
+    })  # fmt: skip
+
+
+def test_lanes_start_where_a_scene_by_itself_does_however_its_start_is_rounded() -> None:
+    """Places of a file miss the joints by their last digit; what a single run corrects lanes correct too."""
+    times = np.array([0.0, 0.05])
+    for seed in range(16):
+        rng = np.random.default_rng(seed)
+        scene = rounded_pendulum(rng, digits=int(rng.integers(2, 14)))
+        stated = float(scene.initial["M0"].position[0])  # type: ignore[index]
+        values = np.array([stated, stated + 1e-9, stated * (1.0 + 1e-6)])
+        lanes = simulate(scene, times, {"initial.M0.position.0": values})
+        for lane, value in enumerate(values):
+            try:
+                alone = simulate(scene.with_values({"initial.M0.position.0": float(value)}), times)
+            except InputError:
+                assert lanes.status[lane] is not Status.OK
+                continue
+            assert lanes.status[lane] is alone.status[0], (seed, lanes.reasons)
+            np.testing.assert_allclose(lanes.points[..., lane], alone.points[..., 0], atol=1e-9)

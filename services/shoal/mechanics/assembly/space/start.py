@@ -174,9 +174,9 @@ class _Closing:
                 self.q[:, lane] = self._with_guesses(found, lane, stated)
                 self._check_strain(begin, self.q[:, lane], lane)
                 return True
-        if self.lanes > 1:
-            return False
         found = self._newton(begin, lane, [])
+        if self.lanes > 1:
+            return found is not None and not self._flipped(found, lane) and self._corrected(found, stated, lane)
         if self.gives_way:
             require_numbers(self.scene)
             self.q[:, lane] = begin if found is None else found
@@ -185,7 +185,7 @@ class _Closing:
             off = np.abs(self.residual(begin[:, None])[:, 0]) / self.scale
             worst = self.terms[int(np.argmax(off))].name
             raise InputError(f"joints.{worst}: cannot be assembled; no poses near the stated ones close it")
-        return self._corrected(found, stated)
+        return self._corrected(found, stated, lane)
 
     def _with_guesses(self, q: Array, lane: int, kept: list[_Stated]) -> Array:
         """Poses that keep the guesses too, one after the other, where the joints and those before let them."""
@@ -201,18 +201,23 @@ class _Closing:
             kept = [*kept, *guess]
         return q
 
-    def _corrected(self, q: Array, stated: list[_Stated]) -> bool:
-        """Whether the stated poses miss by rounding only. Raises InputError if they do not."""
+    def _corrected(self, q: Array, stated: list[_Stated], lane: int) -> bool:
+        """Take poses that close the joints if the stated ones miss them by rounding only, and return whether they do.
+
+        Raises InputError of a single scene if they do not.
+        """
         off = [abs(one.off(q)) / self._unit(one.quantity) for one in stated]
         if max(off, default=0.0) > ROUNDING:
+            if self.lanes > 1:
+                return False
             worst = stated[int(np.argmax(off))]
             unit = "m" if worst.quantity == "position" else "rad"
             raise InputError(
                 f"initial.{worst.body}.{worst.quantity}: contradicts the joints and what else is stated of the start, "
                 f"by {max(off) * self._unit(worst.quantity):.3g} {unit}; leave it out and it follows from the rest"
             )
-        self._check_strain(self.q[:, 0], q, 0)
-        self.q[:, 0] = q
+        self._check_strain(self.q[:, lane], q, lane)
+        self.q[:, lane] = q
         return True
 
     def _check_strain(self, before: Array, after: Array, lane: int) -> None:
