@@ -36,6 +36,7 @@ from shoal.mechanics.verdict import Limits
 from shoal.mechanics.workspace import Workspace
 from shoal.scene import Rod, Scene
 from shoal.scene.ended import End
+from shoal.scene.held_drives import held_drives
 from shoal.trajectory import Status, Trajectory, plain
 
 INSTANTS = 8
@@ -205,6 +206,7 @@ class Machine:
             "evaluations": 0,
             **({"slowed_modes": model.slowed} if model.slowed else {}),
             **({} if begun is None else self._started(begun)),
+            **({"held_drives": held} if (held := held_drives(scene)) else {}),
             "bodies": {
                 name: {"element": body.element, **(body.mesh if isinstance(body, Rod) else {})}
                 for name, body in scene.bodies.items()

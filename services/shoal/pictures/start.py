@@ -16,7 +16,7 @@ REASONS = 4
 
 
 def remarks(model: Mapping[str, Any]) -> list[str]:
-    """Every stated value that was changed, by body, and joints whose forces are not unique."""
+    """Return sentences on stated values that were changed, redundant joints, and drives whose rate jumps."""
     found = [
         f"start of {body} changed: {quantity} {_written(one['used'])} {one['unit']}, stated {_written(one['stated'])}"
         for body, quantities in model.get("initial_changes", {}).items()
@@ -24,7 +24,7 @@ def remarks(model: Mapping[str, Any]) -> list[str]:
     ]
     if joints := model.get("redundant_joints"):
         found.append(f"redundant joints: {', '.join(joints)}; the motion is unique, their forces are the least ones")
-    return found
+    return found + list(model.get("held_drives", ()))
 
 
 def reasons(sweep: Sweep) -> list[str]:
