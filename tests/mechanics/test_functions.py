@@ -135,6 +135,26 @@ def test_antiderivative() -> None:
     np.testing.assert_allclose(along([fitting.antiderivative(fitted)], 0, times), expected, rtol=0, atol=1e-13)
 
 
+@pytest.mark.parametrize("power", [1 / 3, 0.5, 0.2, 0.1, 0.05, 2 / 3, 0.9])
+def test_roots_of_a_kink_are_fitted(power: float) -> None:
+    rng = np.random.default_rng(int(1000 * power))
+    place, begin, factor = rng.uniform(0.1, 0.9), rng.uniform(-1.0, 1.0), rng.uniform(0.5, 3.0)
+    text = f"{begin!r} + abs({factor!r}*(t - {place!r}))**{power!r}"
+    fitted = fitting.fit(Function(expression=text), 1.0)
+    times = np.linspace(0.0, 1.0, 1001)
+    expected = begin + np.abs(factor * (times - place)) ** power
+    np.testing.assert_allclose(along([fitted], 0, times), expected, rtol=0, atol=1e-11)
+    whole = begin + factor**power * ((1.0 - place) ** (power + 1) + place ** (power + 1)) / (power + 1)
+    integral = along([fitting.antiderivative(fitted)], 0, np.array([1.0]))
+    np.testing.assert_allclose(integral, [whole], rtol=0, atol=1e-11)
+
+
+@pytest.mark.parametrize("power", [-1 / 3, -0.05])
+def test_roots_without_a_bound_are_refused(power: float) -> None:
+    with pytest.raises(InputError, match=r"^function: .*pole"):
+        fitting.fit(Function(expression=f"abs(t - 0.3)**({power!r})"), 1.0)
+
+
 @pytest.mark.parametrize("text", ["log(t - 1)", "1/(t - t)", "sin(1e9*t)", "exp(100*t)*exp(100*t)"])
 def test_what_cannot_be_fitted_is_refused(text: str) -> None:
     with pytest.raises(InputError, match=r"^function: "):

@@ -53,6 +53,9 @@ FEWER = 0.8
 """A looser run that takes more than this part of the steps takes them for another reason than its tolerance."""
 SHORTER, MORE = 0.5, 4
 """Part of the mean step that those of a tighter run may reach, and how many times as many it may take at most."""
+FARTHER = 3.0
+"""Factor on the distance from singular positions at which they count, for a tighter run; a looser one takes as many
+times as its error is expected to be larger."""
 HALVING = 4.0 / 3.0
 """The error of a method of second order in terms of its distance from the run with half the step.
 
@@ -346,7 +349,9 @@ def _time_deviation(
     away = _apart(trajectory, run)
     chaotic = bool(np.any(away > WRONG * np.array([scale, 1.0])))
     if not chaotic and run.steps <= FEWER * trajectory.steps:
-        return replace(found, factor=1.0 / (np.sqrt(SPAN) - 1.0)), ""
+        # Round-off that singular positions magnify is no matter of the tolerance.
+        singular = trajectory.model.get("passes_singular", False)
+        return found if singular else replace(found, factor=1.0 / (np.sqrt(SPAN) - 1.0)), ""
     # A chaotic motion may be lost to the looser run and not yet to this one, and one whose steps end for other
     # reasons than its tolerance has the same ones in both: a tighter one with shorter steps tells.
     tighter, note = second("time", lambda: _careful(scene, trajectory, TIGHTER), 1)
@@ -386,6 +391,8 @@ def _careful(scene: Scene, trajectory: Trajectory, factor: float | None = None) 
         factor = factor or (1 / SPAN if solver.relative_tolerance > LOOSE else SPAN)
         settings["solver.relative_tolerance"] = max(solver.relative_tolerance * factor, TIGHTEST)
         settings["solver.absolute_tolerance"] = solver.absolute_tolerance * factor
+        # What third derivatives leave at singular positions is proportional to it, and no matter of steps.
+        settings["solver.rank_tolerance"] = usual["rank_tolerance"] * (np.sqrt(SPAN) if factor > 1 else FARTHER)
         if factor < 1 and trajectory.steps:
             settings["solver.max_step"] = SHORTER * float(trajectory.times[-1]) / trajectory.steps
             settings["solver.max_steps"] = max(solver.max_steps, MORE * trajectory.steps)

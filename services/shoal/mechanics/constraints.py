@@ -24,12 +24,15 @@ from shoal.mechanics.numerics.tile import Array, Index, Tile
 
 POWERS = 3
 """Constraints are measured in 1 (directions), m or m^2."""
+OPEN = 1e-6
+"""Largest violation of a constraint that may be believed, relative to the machine's size to its power of a length."""
 
 
 class Constraints(NamedTuple):
     """Product p of constraint k in start[k]:start[k+1] is factor[p] * z[left[p]] * z[right[p]]; left = -1 stands for 1.
 
-    constant: c, (constraints, lanes). lengths: C is in m to that power. drive: number of the function f of every
+    constant: c, (constraints, lanes). lengths: C is in m to that power. open: the size of C from which a joint counts
+    as open, (constraints, lanes). drive: number of the function f of every
     constraint (-1: none). Part r of the Jacobian adds coefficient[r] * z[source[r]] to the entry target[r]; source = -1
     stands for 1.
     Angle r of constraint k in turned[k]:turned[k+1] is that of the vector in the rows rising[r] and rising[r] + 1, with
@@ -43,6 +46,7 @@ class Constraints(NamedTuple):
     factor: Array
     constant: Array
     lengths: Index
+    open: Array
     drive: Index
     entry: Index
     column: Index

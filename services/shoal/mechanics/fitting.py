@@ -28,7 +28,7 @@ from shoal.scene.enclosure import enclose
 from shoal.scene.function import Composed
 
 _SMALLEST = 1e-9
-"""Width, as a fraction of the range, at which bisecting ends."""
+"""Width, as a fraction of the range, at which bisecting ends where nothing is proven."""
 
 _CERTAIN = 1e-11
 """Proven bound on the error of a piece, relative to the function's size."""
@@ -38,7 +38,7 @@ _JUMP = 1e-9
 
 _NOTHING = 1e-13
 """Beside a root such as sqrt(t) at 0 no bound holds; there a piece may vary over its width by so much of the function's
-size times the range."""
+size times the range. Pieces this short need not be bisected further, unless the function has no bound."""
 
 _BESIDE = 1e-6
 """How near that is, as a fraction of the range."""
@@ -186,7 +186,7 @@ def _bisected(part: _Stretch, begin: float, horizon: float, scale: float, steep:
             failing = np.mean(off > np.maximum(16.0 * digits * scale + 2.0 * about, _CANCELLED * scale))
             if failing * np.sum(width[~good]) > _MOST_OF * whole:
                 raise _too_fast(begin, horizon, lower)
-        smallest = ~good & ~rough & (width <= _SMALLEST * whole)
+        smallest = ~good & ~rough & (width <= (_SMALLEST if node is None else _NOTHING) * whole)
         if node is not None and smallest.any():
             raise _too_fast(begin, horizon, lower[smallest])
         rough |= smallest

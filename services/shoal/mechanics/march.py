@@ -131,7 +131,9 @@ def loop(place):  # type: ignore[no-untyped-def]
     for lane in range(len(tile)):
         record.steps[lane] = number + cuts
         record.evaluations[lane] = scheme.evaluations[0]
-        record.reached[lane] = now
+        record.reached[lane], record.near[lane] = now, w.gauss.near[lane]
+    for i in range(2 * len(tile)):
+        record.ended[i] = w.gauss.ended[i]
 
 
 @njit(cache=True, error_model="numpy")
@@ -275,16 +277,21 @@ def _account(
 
 
 @njit(cache=True, error_model="numpy")
-def _look(tile: Tile, m: Arrays, w: Work, k: LoopRoom, now: float, record: Marched) -> bool:
+def _look(tile: Tile, m: Arrays, w: Work, own: LoopRoom, now: float, record: Marched) -> bool:
     """Keep the largest errors of energy and constraints; false if no lane is a number anymore."""
-    _energy(tile, m, w, k.energy, record.energy_scale)
+    _energy(tile, m, w, own.energy, record.energy_scale)
     derive(tile, m.derived, w.z, m.unknowns, m.held_rows, False)
-    constraints.drift(tile, m.constraints, m.functions, now, w.z, k.gap, record.drift)
-    alive = False
-    for lane in range(len(tile)):
-        error = abs(k.energy[lane] + k.dissipated[lane] - k.start[lane])
+    constraints.drift(tile, m.constraints, m.functions, now, w.z, own.gap, record.drift)
+    width, c, alive = len(tile), m.constraints, False
+    for k in range(c.size * width):
+        if abs(own.gap[k]) > c.open[k] and w.gauss.ended[k % width] < 0.0:
+            w.gauss.ended[k % width], w.gauss.ended[width + k % width] = now, k // width
+    for lane in range(width):
+        error = abs(own.energy[lane] + own.dissipated[lane] - own.start[lane])
         if not error <= record.energy_error[lane]:
             record.energy_error[lane] = error
+        if not np.isfinite(error) and w.gauss.ended[lane] < 0.0:
+            w.gauss.ended[lane] = now
         alive = alive or np.isfinite(error)
     return alive
 

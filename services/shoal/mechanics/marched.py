@@ -22,7 +22,8 @@ class Marched(NamedTuple):
 
     energy_error: largest |E + dissipated - E(0)| [J]; energy_scale: largest energy in motion [J], kinetic, of
     bent bodies and the size of that of springs; drift: largest violation of a constraint by its power of a length,
-    (POWERS * lanes,); begin: coordinates and rates at the start, made consistent, (2 * unknowns, lanes).
+    (POWERS * lanes,); begin: coordinates and rates at the start, made consistent, (2 * unknowns, lanes);
+    ended, near: as in `GaussWork`, (2 * lanes,) and (lanes,).
     Common to the lanes of a tile: steps taken, evaluations of the forces, the time reached [s].
     """
 
@@ -31,6 +32,8 @@ class Marched(NamedTuple):
     energy_scale: Array
     drift: Array
     begin: Array
+    ended: Array
+    near: Array
     steps: Array
     evaluations: Array
     reached: Array
@@ -80,6 +83,8 @@ def rooms(tile: Tile, arrays: Arrays, times: int, marker_rows: Index) -> tuple[M
         np.zeros(width),
         np.zeros(constraints.POWERS * width),
         np.zeros(2 * end),
+        np.zeros(2 * width),
+        np.zeros(width),
         np.zeros(width),
         np.zeros(width),
         np.zeros(width),
@@ -160,11 +165,12 @@ def frame_type(frame: Frame) -> Any:
     return types.CPointer(raw_type(typeof(frame)))
 
 
-FARTHEST, ENERGY_DRIFT, CONSTRAINT_DRIFT, ENERGY_SCALE, STEPS, EVALUATIONS, REACHED = range(7)
+FARTHEST, ENERGY_DRIFT, CONSTRAINT_DRIFT, ENERGY_SCALE = range(4)
+STEPS, EVALUATIONS, REACHED, ENDED, UNCLOSED, NEAR = range(4, 10)
 """Rows of the numbers that a run is judged by: the largest distance of a marker from its nearest anchor [m]; the energy
 error over the largest energy in motion; the largest violation of a constraint, relative to the machine's size;
 and as `Marched` has them."""
-NUMBERS = 7
+NUMBERS = 10
 
 
 @njit(cache=True, error_model="numpy")
@@ -217,6 +223,8 @@ def told(
         numbers[ENERGY_DRIFT, lane] = record.energy_error[own] / _larger(record.energy_scale[own], floor)
         numbers[ENERGY_SCALE, lane], numbers[STEPS, lane] = record.energy_scale[own], record.steps[own]
         numbers[EVALUATIONS, lane], numbers[REACHED, lane] = record.evaluations[own], record.reached[own]
+        numbers[ENDED, lane], numbers[UNCLOSED, lane] = record.ended[own], record.ended[width + own]
+        numbers[NEAR, lane] = record.near[own]
 
 
 @njit(cache=True, error_model="numpy")

@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from shoal.mechanics import reach as reaches
+from shoal.mechanics.constraints import OPEN
 from shoal.mechanics.forces import ANGLE, LAW, STIFFNESS
 from shoal.mechanics.functions import value
 from shoal.mechanics.integrators import Choice, facts
-from shoal.mechanics.marched import CONSTRAINT_DRIFT, ENERGY_SCALE, FARTHEST, REACHED, STEPS
+from shoal.mechanics.marched import CONSTRAINT_DRIFT, ENDED, ENERGY_SCALE, FARTHEST, REACHED, STEPS, UNCLOSED
 from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import Array, Flags
-from shoal.scene import Function, Scene
+from shoal.scene import GROUND, Function, Scene
 from shoal.scene.joints import Joint
 from shoal.trajectory import Status
 
-DRIFT_TOLERANCE = 1e-6
 ROUND_OFF = 1e-12
 """Of a place, as a part of the machine's size."""
 SINKING = 3000.0
@@ -23,6 +23,9 @@ SINKING = 3000.0
 it is 14 times as fast as that. Twice as much is no error by the default tolerance of energies, a hundredth."""
 RESOLVED = 1e4
 """Of rates of so many absolute tolerances the errors of 50 steps, added up, are a hundredth of the energy."""
+
+REACH = "let the drives ask for no more than the joints can reach"
+"""Advice where a machine is driven."""
 
 _JUDGED = slice(FARTHEST, CONSTRAINT_DRIFT + 1)
 """What has a largest value."""
@@ -35,7 +38,7 @@ class Limits:
     """
 
     def __init__(self, scene: Scene, model: Model) -> None:
-        self._solver, self._model = scene.solver, model
+        self._scene, self._solver, self._model = scene, scene.solver, model
         self.span = reaches.span(scene)
         """The machine's size [m]."""
         self.anchors = reaches.anchors(model.scene)
@@ -53,7 +56,7 @@ class Limits:
         self._still = self._weight * 1e-9 * self.span + 1e-12 * float(stiff) + self._sprung() * ROUND_OFF**2 / 2
         # So far away a marker may be whatever the energy of the run.
         near = np.minimum(self._reach(np.zeros(1)), np.finfo(float).max)
-        tolerances = np.array([[scene.solver.energy_tolerance], [DRIFT_TOLERANCE]])
+        tolerances = np.array([[scene.solver.energy_tolerance], [OPEN]])
         self._fine = np.concatenate([near[None], np.broadcast_to(tolerances, (2, len(near)))])
 
     def _reach(self, energy: Array) -> Array:
@@ -104,6 +107,8 @@ class Limits:
         finite = np.isfinite(farthest) and np.isfinite(energy_drift)
         if failed:
             return Status.FAILED, "no start agrees with the joints and with what is stated"
+        if not finite and numbers[UNCLOSED] >= 0:
+            return Status.DRIFTED if self._driven else Status.DIVERGED, self._open(numbers)
         if not finite and np.isfinite(energy_drift) and adaptive and steps >= self._solver.max_steps:
             return Status.FAILED, (
                 f"{steps:.0f} steps of {choice.name} led to {numbers[REACHED]:.4g} s only; "
@@ -111,16 +116,35 @@ class Limits:
             )
         if not finite:
             advice = "no step is short enough for it" if adaptive else "use a smaller step"
-            if self._driven:
-                advice += ", or let the drives ask for no more than the joints can reach"
-            return Status.DIVERGED, f"the motion is not finite; {advice}{self._laws}"
+            ended = f"the motion is not finite {self._since(numbers[ENDED])}"
+            return Status.DIVERGED, f"{ended}; {advice}{', or ' + REACH if self._driven else ''}{self._laws}"
         if farthest > reach:
             return Status.OUT_OF_REACH, f"a marker is {farthest:.3g} m away, the reach is {reach:.3g} m"
         if energy_drift > allowed:
             return Status.ENERGY, f"energy is off by {energy_drift:.2g}, allowed {allowed:g} (relative)"
-        if not constraint_drift <= DRIFT_TOLERANCE:
-            return Status.DRIFTED, f"constraints are violated by {constraint_drift:.2g} of the machine's size"
+        if not constraint_drift <= OPEN:
+            return Status.DRIFTED, self._open(numbers)
         return Status.OK, ""
+
+    def _open(self, numbers: Array) -> str:
+        """Which joint the positions cannot close, from when on, and what may be the cause."""
+        field = self._field(self._model.constraint_names[int(numbers[UNCLOSED])])
+        cause = REACH if self._driven else "use a smaller step"
+        return f"constraints are violated: {field} cannot be closed {self._since(numbers[ENDED])}; {cause}"
+
+    def _since(self, t: float) -> str:
+        """An instant [s], and the drives that move then."""
+        model = self._model
+        moving = {
+            self._field(name): None
+            for name, k in zip(model.constraint_names, model.constraints.drive, strict=True)
+            if k >= 0 and any(value(model.function(int(k)), t, order) for order in (1, 2, 3))
+        }
+        return f"from t = {t:.6g} s on" + (f", where {', '.join(moving)} moves" if moving else "")
+
+    def _field(self, name: str) -> str:
+        """The field that states a constraint."""
+        return f"joints.{name}" if name in self._scene.joints else name.replace(GROUND, "ground_points", 1)
 
 
 def _constant(joint: Joint) -> bool:

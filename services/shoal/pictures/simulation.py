@@ -59,7 +59,7 @@ def page(
             *(["angle [rad]"] if _is_flat(trajectory) else []),
         ],
         rows=[[name, *_end(trajectory, name)] for name in trajectory.markers if tells_places(trajectory, selection)],
-        remarks=remarks(trajectory.model) + _remarks(trajectory, selection),
+        remarks=remarks(trajectory.model, trajectory.ok) + _remarks(trajectory, selection),
         pictures=[one.embedded() for one in pictures],
         models=[] if selection is None else rows(selection),
         provenance=_provenance(trajectory, scene),

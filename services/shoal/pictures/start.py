@@ -15,15 +15,19 @@ REASONS = 4
 """So many reasons of points that failed are told."""
 
 
-def remarks(model: Mapping[str, Any]) -> list[str]:
-    """Return sentences on stated values that were changed, redundant joints, and drives whose rate jumps."""
+def remarks(model: Mapping[str, Any], ok: bool = True) -> list[str]:
+    """Return sentences on stated values that were changed, redundant joints, and drives whose rate jumps.
+
+    ok: whether the run is believed.
+    """
     found = [
         f"start of {body} changed: {quantity} {_written(one['used'])} {one['unit']}, stated {_written(one['stated'])}"
         for body, quantities in model.get("initial_changes", {}).items()
         for quantity, one in quantities.items()
     ]
     if joints := model.get("redundant_joints"):
-        found.append(f"redundant joints: {', '.join(joints)}; the motion is unique, their forces are the least ones")
+        unique = "; the motion is unique, their forces are the least ones" if ok else ""
+        found.append(f"redundant joints: {', '.join(joints)}{unique}")
     return found + list(model.get("held_drives", ()))
 
 

@@ -13,6 +13,7 @@ from shoal.mechanics.assembly.rows import Rows
 from shoal.mechanics.least import principle
 from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import index, stacked
+from shoal.mechanics.reach import span
 from shoal.mechanics.rubbing import Rubbing
 from shoal.scene import GROUND, Distance, Scene
 
@@ -45,7 +46,7 @@ def build(scene: Scene, lanes: int = 1, horizon: float = 0.0) -> Model:
     masses = Masses(scene, placement, rows)
     loads = Loads(scene, placement, rows, horizon)
     force_rows = rows.size
-    held = terms.assemble(placement.terms, rows, len(loads.fitted))
+    held = terms.assemble(placement.terms, rows, len(loads.fitted), span(scene))
     for one in placement.terms.held:
         if one.drive is not None:
             field = f"joints.{one.name}" if one.name in scene.joints else one.name.replace(GROUND, "ground_points", 1)

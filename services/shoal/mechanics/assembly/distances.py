@@ -4,16 +4,26 @@ from __future__ import annotations
 
 import numpy as np
 
+from shoal.errors import InputError
 from shoal.mechanics.affine import fixed
 from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.joints import Apart, Sum
+from shoal.mechanics.reach import span
 from shoal.scene import Scene
+
+NOTHING = 1e-9
+"""A distance that is none, as a part of the machine's size."""
 
 
 def keep_distance(scene: Scene, name: str, condition: Apart, result: Placement) -> None:
     """Between two places: that of the start, or one that is stated."""
     gap = result.gap(scene, condition)
     if condition.length is None:
+        if np.any(sum(result.start_of(gap)[0] ** 2) < (NOTHING * span(scene)) ** 2):
+            raise InputError(
+                f"joints.{name}.length: not stated, so it is that of the start, 0 m, which has no direction; "
+                "let the two places start apart, state the length, or join them by a revolute joint"
+            )
         result.terms.dot(name, gap, gap, 2, -sum(result.start_of(gap)[0] ** 2))
     else:
         result.terms.dot(name, gap, gap, 2, drive=condition.length.through("square", "neg"))

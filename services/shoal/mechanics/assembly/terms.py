@@ -12,7 +12,7 @@ import numpy as np
 from shoal.mechanics import plane
 from shoal.mechanics.affine import Affine, fixed
 from shoal.mechanics.assembly.rows import Rows
-from shoal.mechanics.constraints import Constraints
+from shoal.mechanics.constraints import OPEN, Constraints
 from shoal.mechanics.numerics.tile import Array, Number, index, stacked
 from shoal.scene.function import Composed
 
@@ -134,8 +134,11 @@ class Terms:
             self.dot(name, fixed(axis[:, None]), vector, 1, drive=drives[k] if drives else None)
 
 
-def assemble(terms: Terms, rows: Rows, driven: int) -> Constraints:
-    """The lists of the collected constraints. Their functions of time are numbered from `driven` on, in their order."""
+def assemble(terms: Terms, rows: Rows, driven: int, size: float) -> Constraints:
+    """The lists of the collected constraints. Their functions of time are numbered from `driven` on, in their order.
+
+    size: a length of the machine [m].
+    """
     start, entry = [0], [0]
     lefts: list[int] = []
     rights: list[int] = []
@@ -187,6 +190,7 @@ def assemble(terms: Terms, rows: Rows, driven: int) -> Constraints:
         stacked(factors),
         stacked([held.constant for held in terms.held]),
         index([held.lengths for held in terms.held]),
+        stacked([OPEN * size**held.lengths for held in terms.held]),
         index(drive),
         index(entry),
         index(column),

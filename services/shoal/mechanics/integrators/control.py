@@ -117,14 +117,14 @@ def accept(c: Control, error: float, h: float, order: int, rejected: bool) -> No
 
 
 @njit(cache=True, error_model="numpy")
-def give_up(tile: Tile, m: Arrays, w: Work, c: Control) -> bool:
-    """Turn the lanes whose error is not allowed into nan; false if no lane is left."""
+def give_up(tile: Tile, m: Arrays, w: Work, c: Control, t: float) -> bool:
+    """End the lanes whose error is not allowed at the instant t [s]: they become nan; false if no lane is left."""
     width = len(tile)
     end = m.unknowns * width
     left = False
     for lane in range(width):
         if c.alive[lane] > 0.0 and not c.error[lane] <= 1.0:
-            c.alive[lane] = 0.0
+            c.alive[lane], w.gauss.ended[lane] = 0.0, t
             for i in range(lane, end, width):
                 w.before[i], w.before[end + i], w.z[i], w.zdot[i] = np.nan, np.nan, np.nan, np.nan
         left = left or c.alive[lane] > 0.0

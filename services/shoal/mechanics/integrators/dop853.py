@@ -135,7 +135,7 @@ def step(tile: Tile, scheme: Dop853, m: Arrays, w: Work, t: float, h: float) -> 
         rejected = True
         h = control.shorter(error, h, ORDER_OF_ERROR)
         if h < RESOLUTION * (t + rest):
-            if not control.give_up(tile, m, w, c):
+            if not control.give_up(tile, m, w, c, t):
                 return rest
             h = control.first_trial(c, rest)
     control.accept(c, error, h, ORDER_OF_ERROR, rejected)

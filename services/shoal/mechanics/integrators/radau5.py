@@ -339,7 +339,7 @@ def step(tile: Tile, scheme: Radau5, m: Arrays, w: Work, t: float, h: float) -> 
             h = control.shorter(np.inf, h, ORDER_OF_ERROR)
         rejected = True
         if h < RESOLUTION * (t + rest):
-            if not control.give_up(tile, m, w, c):
+            if not control.give_up(tile, m, w, c, t):
                 return rest
             h = control.first_trial(c, rest)
     control.accept(c, error, trial, ORDER_OF_ERROR, rejected)

@@ -44,8 +44,9 @@ def project(
     """Move q and v back onto C = 0 and C_q v = -C_t by the smallest change in the mass metric.
 
     ready: whether the accelerations at q have just been found by the projection, whose directions are at hand.
+    Where no position closes the constraints, as no drive beyond the reach of the joints does, the motion ends.
     """
-    factored, before = ready and m.saddle.size > 0 and w.saddle.weak[0] == 0.0, np.inf
+    factored, before, now = ready and m.saddle.size > 0 and w.saddle.weak[0] == 0.0, np.inf, 0.0
     for _ in range(iterations):
         derive(tile, m.derived, q, m.unknowns, m.held_rows, False)
         constraints.residual(tile, m.constraints, m.functions, t, q, w.gap)
@@ -57,7 +58,27 @@ def project(
             factored = _prepare(tile, m, w)
         _correct(tile, m, w, q, tolerance, factored)
         before = now
+    if now > SMALL:
+        _leave_open(tile, m, w, t, q, v)
     _project_rates(tile, m, w, t, q, v, tolerance, factored)
+
+
+@njit(cache=True, error_model="numpy")
+def _leave_open(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array) -> None:
+    """End the motion of lanes whose constraints the change has not closed: t and the most open one go into w.ended."""
+    width, c = len(tile), m.constraints
+    derive(tile, m.derived, q, m.unknowns, m.held_rows, False)
+    constraints.residual(tile, c, m.functions, t, q, w.gap)
+    for lane in range(width):
+        worst, most = -1, 1.0
+        for k in range(c.size):
+            part = abs(w.gap[k * width + lane]) / c.open[k * width + lane]
+            if part > most:
+                worst, most = k, part
+        if worst >= 0:
+            w.ended[lane], w.ended[width + lane] = t, worst
+            for i in range(lane, m.unknowns * width, width):
+                q[i], v[i] = np.nan, np.nan
 
 
 @njit(cache=True, error_model="numpy")

@@ -118,7 +118,8 @@ def _add_third_derivatives(tile: Tile, m: Arrays, w: GaussWork, t: float, v: Arr
             for i in range(n):
                 largest = max(largest, abs(rows[rank, i]))
                 load[i * width + lane] = rows[rank, i]
-            if not largest > STILL * constraints.pace(tile, c, weights, v, lane):
+            pace = constraints.pace(tile, c, weights, v, lane)
+            if not largest > STILL * pace:
                 continue
             solve(tile, m, w, pointer(load), pointer(zeros), pointer(found), w.multiplier)
             whole = 0.0
@@ -130,7 +131,7 @@ def _add_third_derivatives(tile: Tile, m: Arrays, w: GaussWork, t: float, v: Arr
                 for i in range(n):
                     moves[rank, i] -= part * moves[r, i]
             along = dot(rows[rank], moves[rank])
-            if not along > 1e-10 * whole:
+            if not along > 1e-10 * whole * (3.0 * pace / largest) ** 2:
                 continue
             gap = target
             for i in range(n):

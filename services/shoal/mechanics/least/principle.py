@@ -9,15 +9,20 @@ from __future__ import annotations
 from numba import njit
 
 from shoal.errors import InputError
-from shoal.mechanics import constraints, functions
+from shoal.mechanics import constraints
 from shoal.mechanics.derived import derive
-from shoal.mechanics.least import alternatives, lent, many, projection, together
-from shoal.mechanics.least.work import GaussWork, LaneWork, lane_work, load_lane, rows
+from shoal.mechanics.least import alternatives, branch, lent, many, projection, together
+from shoal.mechanics.least.work import HERE, PASSED, GaussWork, lane_work, load_lane, rows
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics import sparse
 from shoal.mechanics.numerics.simd import EIGHT
 from shoal.mechanics.numerics.tile import Array, Tile
 
+LEAVING = 3.0
+"""A singular position is left this much farther away than it is entered: the distance depends on the order of pivots,
+and steps would end at every change between the two ways to the acceleration."""
+ROUND_OFF = 1e-11
+"""What is left of a row that is redundant everywhere, as a part of its length."""
 PROJECTION, BAUMGARTE = 0, 4
 METHODS = {
     "projection": PROJECTION,
@@ -83,14 +88,23 @@ def constrain(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array,
         for k in range(count):
             s.weights[k] = -w.gap[k * width + lane]
         if orthogonal:
-            rank = projection.orthonormalise(s.rows, s.triangle, s.norms, s.order, tolerance)
+            near = tolerance * (LEAVING if w.near[lane] == HERE else 1.0)
+            rank = projection.orthonormalise(s.rows, s.triangle, s.norms, s.order, near)
+            if projection.left(rank, s.rows) > ROUND_OFF:
+                w.near[lane] = HERE
+            elif w.near[lane] == HERE:
+                w.near[lane] = PASSED
             first = rank
             projection.components(rank, s.triangle, s.norms, s.order, s.weights, s.wanted)
+            locked = False
             if rank < count:
-                turned = turned or _turn(tile, m, w, v)
-                rank = _add_third_derivatives(tile, m, w, s, t, v, lane, rank)
+                turned = False
+                rank, locked = branch.follow(tile, m, w, s, t, v, a, lane, rank, tolerance)
+                w.near[lane] = HERE if locked or rank > first else w.near[lane]
             projection.move(rank, s.rows, s.wanted, s.y)
             lent.take_back_from_lane(tile, m, w, s, lane, rank, orthogonal)
+            if locked:
+                projection.confine(rank, s.rows, s.y, s.row)
             projection.multipliers(first, s.triangle, s.norms, s.order, s.wanted, s.weights)
         else:
             s.wanted[:] = 0.0
@@ -115,44 +129,23 @@ def _turn(tile: Tile, m: Arrays, w: GaussWork, v: Array) -> bool:
 
 @njit(cache=True, error_model="numpy")
 def _are_redundant(tile: Tile, m: Arrays, w: GaussWork, v: Array, lane: int, rank: int) -> bool:
-    """Whether the rows of a group beyond a rank add nothing by third derivatives; dC_q/dt is in w."""
+    """Whether the rows of a group beyond a rank add nothing by third derivatives; dC_q/dt is in w.
+
+    At rest those vanish and say nothing.
+    """
     c, n, width = m.constraints, m.unknowns, len(tile)
+    for k in range(lane, lane + len(EIGHT)):
+        moving = 0.0
+        for i in range(n):
+            moving += abs(v[i * width + k])
+        if moving == 0.0:
+            return False
     for number in range(rank, c.size):
         if not together.third_derivative(c, w.group, rank, number, n, width, lane, v, w.turning, many.STILL, w.extra):
             sparse.forward(tile, m.pattern, m.mass_factor, m.mass_root, w.extra, 0)
             if not together.depends(w.group, rank, n, width, lane, w.extra, projection.NEW):
                 return False
     return True
-
-
-@njit(cache=True, error_model="numpy")
-def _add_third_derivatives(
-    tile: Tile, m: Arrays, w: GaussWork, s: LaneWork, t: float, v: Array, lane: int, rank: int
-) -> int:
-    """Rows u' d3C/dt3 = 0 for the dependent combinations u of one lane; returns the new rank. dC_q/dt is in w."""
-    width = len(tile)
-    count, n = m.constraints.size, m.unknowns
-    c = m.constraints
-    first = rank
-    for number in range(first, count):
-        projection.dependence(number, first, s.triangle, s.norms, s.order, s.weights)
-        target = 0.0
-        for i in range(n * width):
-            w.extra[i] = 0.0
-        for k in range(count):
-            target -= s.weights[k] * functions.evaluate(m.functions, c.drive[k], t, 3)
-            for e in range(c.entry[k], c.entry[k + 1]):
-                w.extra[c.column[e] * width + lane] += 3.0 * s.weights[k] * w.turning[e * width + lane]
-        largest = 0.0
-        for i in range(n):
-            largest = max(largest, abs(w.extra[i * width + lane]))
-        if not largest > many.STILL * constraints.pace(tile, c, s.weights, v, lane):
-            continue  # redundant everywhere, or at rest
-        sparse.forward(tile, m.pattern, m.mass_factor, m.mass_root, w.extra, 0)
-        for i in range(n):
-            s.row[i] = w.extra[i * width + lane]
-        rank = projection.extend(rank, s.rows, s.wanted, s.row, target, projection.NEW)
-    return rank
 
 
 @njit(cache=True, error_model="numpy")

@@ -5,9 +5,7 @@ minimiser moves y_f by the least norm. The rows are orthonormalised with pivotin
 what is left of a row when it depends on the others, compared with its own length, is a distance from the singular
 position, not its square. One lane at a time, on contiguous work space.
 
-At a singular position the minimiser is in general not the limit of the motion. Every combination u of rows that
-vanishes (u' C_q = 0) adds the row u' d3C/dt3 = 0, which for quadratic constraints is linear in the acceleration:
-3 u' (C_qq v) a = -u' C_ttt. Rows that are redundant everywhere add nothing, because theirs vanish as well.
+At a singular position the minimiser is in general not the limit of the motion: see `branch`.
 """
 
 from __future__ import annotations
@@ -18,7 +16,10 @@ from numba import njit
 from shoal.mechanics.numerics.tile import Array, Index
 
 NEW = 1e-6
-"""What must be left of a row by third derivatives, as a part of its length, to add to the others."""
+"""What must be left of a row by third derivatives, as a part of the size of its terms, to add to the others."""
+TIE = 1.0 + 1e-6
+"""Squares of lengths that differ by less are equal, and the first row is the pivot: round-off must not choose, step by
+step, which of two constraints is met that contradict each other."""
 NOTHING = 1e-10
 """A row that has no larger share in a combination than this part of the largest is not in it, but for round-off.
 
@@ -63,7 +64,7 @@ def orthonormalise(rows: Array, triangle: Array, norms: Array, order: Index, tol
         pivot, longest = k, -1.0
         for j in range(k, count):
             length = dot(rows[j], rows[j])
-            if length > longest:
+            if length > TIE * longest:
                 pivot, longest = j, length
         if not np.sqrt(longest) > tolerance:
             return k
@@ -90,6 +91,15 @@ def orthonormalise(rows: Array, triangle: Array, norms: Array, order: Index, tol
             for i in range(n):
                 rows[j, i] -= part * rows[k, i]
     return count
+
+
+@njit(cache=True, error_model="numpy")
+def left(rank: int, rows: Array) -> float:
+    """What is left of the rows that depend on the basis, as a part of their lengths."""
+    longest = 0.0
+    for k in range(rank, rows.shape[0]):
+        longest = max(longest, dot(rows[k], rows[k]))
+    return np.sqrt(longest)  # type: ignore[no-any-return]
 
 
 @njit(cache=True, error_model="numpy")
@@ -143,6 +153,18 @@ def take_out(rank: int, rows: Array, change: Array, y: Array) -> None:
         change[j] -= part
         for i in range(n):
             y[i] -= part * rows[j, i]
+
+
+@njit(cache=True, error_model="numpy")
+def confine(rank: int, rows: Array, y: Array, room: Array) -> None:
+    """Take out of y what is not along the basis; room: (unknowns,)."""
+    room[:] = y
+    for j in range(rank):
+        part = dot(rows[j], room)
+        for i in range(rows.shape[1]):
+            room[i] -= part * rows[j, i]
+    for i in range(rows.shape[1]):
+        y[i] -= room[i]
 
 
 @njit(cache=True, error_model="numpy")

@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 
 from shoal.mechanics.constraints import Constraints
-from shoal.mechanics.least.projection import NOTHING
+from shoal.mechanics.least.projection import NOTHING, TIE
 from shoal.mechanics.numerics.simd import EIGHT, heaviside, larger, least, load, root, spread, store
 from shoal.mechanics.numerics.tile import Array, Index
 
@@ -101,7 +101,7 @@ def orthonormalise(w: GroupWork, count: int, n: int, width: int, lane: int, give
         place, most = k, -1.0
         for j in range(k, count):
             length = least(load(EIGHT, w.left, w.order[j] * e))
-            if length > most:
+            if length > TIE * most:
                 place, most = j, length
         if not most > apart:
             return k if _are_gone(w, k, count, tolerance) else ALONE

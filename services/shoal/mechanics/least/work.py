@@ -16,11 +16,16 @@ from shoal.mechanics.numerics.tile import Array, Index, Tile
 from shoal.mechanics.numerics.vector import clear, copy
 from shoal.mechanics.saddle import SaddleWork
 
+HERE, PASSED = 1.0, 2.0
+"""Of a lane that is at a singular position, or has been at one."""
+UNENDED = -1.0
+"""Of a lane that moves on: neither an instant nor the number of a constraint."""
+
 
 class LaneWork(NamedTuple):
     """Room for one lane at a time.
 
-    rows: (constraints, unknowns); triangle, norms, order, wanted, weights: by constraint; y, row: (unknowns,).
+    rows: (constraints, unknowns); triangle, norms, order, wanted, weights, shift: by constraint; y, row: (unknowns,).
     """
 
     rows: Array
@@ -29,6 +34,7 @@ class LaneWork(NamedTuple):
     order: Index
     wanted: Array
     weights: Array
+    shift: Array
     y: Array
     row: Array
 
@@ -38,7 +44,9 @@ class GaussWork(NamedTuple):
 
     jacobian, turning: C_q and dC_q/dt (entries, lanes). response: C_q' or H^-1 C_q' (constraints * unknowns, lanes).
     gram: (constraints^2, lanes). multiplier, gap: (constraints, lanes). extra, moved, lent: (unknowns, lanes), for
-    the two last see `lent`.
+    the two last see `lent`. branch: tangent of the motion at a singular position, (rows, lanes). near: whether a lane
+    is at a singular position, HERE, or was, PASSED, else 0, (lanes,). ended: by lane the instant [s] from which its
+    motion is no number, then the constraint that could not be closed, or UNENDED.
     """
 
     jacobian: Array
@@ -50,6 +58,9 @@ class GaussWork(NamedTuple):
     extra: Array
     moved: Array
     lent: Array
+    branch: Array
+    near: Array
+    ended: Array
     lane: LaneWork
     group: GroupWork
     saddle: SaddleWork
@@ -60,12 +71,14 @@ def work_space(width: int, m: Arrays) -> GaussWork:
     count, n, entries = m.constraints.size, m.unknowns, len(m.constraints.column)
     sizes = entries, entries, count * n, count * count, count, count
     jacobian, turning, response, gram, multiplier, gap = (np.zeros(size * width) for size in sizes)
-    extra, moved, lent = (np.zeros(n * width) for _ in range(3))
+    extra, moved, lent, branch = (np.zeros(rows * width) for rows in (n, n, n, m.rows))
     order = np.zeros(count, dtype=np.int64)
-    first = np.zeros((count, n)), np.zeros((count, count)), np.zeros(count), order, np.zeros(count), np.zeros(count)
+    wanted, weights, shift = (np.zeros(count) for _ in range(3))
+    first = np.zeros((count, n)), np.zeros((count, count)), np.zeros(count), order, wanted, weights, shift
     lane = LaneWork(*first, np.zeros(n), np.zeros(n))
     group, room = together.room(width, count, n), saddle.room(m.saddle.size, m.saddle.slots, width)
-    return GaussWork(jacobian, turning, response, gram, multiplier, gap, extra, moved, lent, lane, group, room)
+    vectors = multiplier, gap, extra, moved, lent, branch, np.zeros(width), np.full(2 * width, UNENDED)
+    return GaussWork(jacobian, turning, response, gram, *vectors, lane, group, room)
 
 
 @njit(cache=True, error_model="numpy")
@@ -79,6 +92,7 @@ def lane_work(m: Arrays, w: GaussWork) -> LaneWork:
         carray(w.lane.order, (count,)),
         carray(w.lane.wanted, (count,)),
         carray(w.lane.weights, (count,)),
+        carray(w.lane.shift, (count,)),
         carray(w.lane.y, (n,)),
         carray(w.lane.row, (n,)),
     )

@@ -47,7 +47,7 @@ def trajectory_table(trajectory: Trajectory, scene: Scene, selection: Selection 
     slowed = trajectory.model.get("slowed_modes")
     raised = f"; the inertia of {slowed} axial modes is raised to suit the step" if slowed else ""
     screen.say(f"{trajectory.steps} steps in {trajectory.wall_s * 1e3:.1f} ms{raised}")
-    screen.say(*remarks(trajectory.model))
+    screen.say(*remarks(trajectory.model, trajectory.ok))
     screen.say(*estimates(trajectory))
 
 
@@ -113,7 +113,7 @@ def comparison_table(comparison: Comparison) -> None:
         table.add_row(name, *place, f"{trajectory.energy_drift[0]:.0e}", time, str(trajectory.status[0]))
     screen.out.print(table)
     screen.say(*(f"{name} refused: {reason}" for name, reason in comparison.refused.items()))
-    screen.say(*next(filter(None, (remarks(trajectory.model) for trajectory in comparison.trajectories.values())), []))
+    screen.say(*next(filter(None, (remarks(one.model, one.ok) for one in comparison.trajectories.values())), []))
     if comparison.errors.estimates:
         screen.say(
             f"known error of the model that engines share (more careful runs of {comparison.verified}): "

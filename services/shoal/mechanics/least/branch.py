@@ -1,0 +1,283 @@
+"""Tangent of the branch of the motion at a singular position, and the rows that keep the acceleration on the branch.
+
+At a singular position combinations u of constraints vanish (u' C_q = 0) and restrict the motion to higher order only.
+For constraints that are quadratic in the coordinates, velocities satisfy u' (C_qq v v + C_tt) = 0, the tangent cone of
+the configuration space: one line for each branch of a linkage that crosses there. The acceleration then satisfies
+3 u' C_qq x a = -u' C_ttt, a linear row, with the tangent x = v. Rows of constraints that are redundant everywhere
+vanish.
+
+The velocity satisfies the cone up to round-off and truncation only. Near rest round-off is all of it, and the rows of
+such a velocity would leave the machine no acceleration at all. So v is first projected onto the cone (Gauss-Newton on
+u' C_qq x x / |x|^2 in the mass metric). At rest the tangent is the direction of the acceleration, which satisfies
+u' C_qq a a = 0 by the fourth derivative: a fixed point of the tangent and the acceleration of least constraint along
+it, sought from the minimiser first, then from other directions. Where no branch accelerates, the machine stays at rest.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from shoal.mechanics import constraints, functions
+from shoal.mechanics.derived import derive
+from shoal.mechanics.least import projection
+from shoal.mechanics.least.many import STILL
+from shoal.mechanics.least.work import GaussWork, LaneWork
+from shoal.mechanics.model import Arrays
+from shoal.mechanics.numerics import sparse
+from shoal.mechanics.numerics.tile import Array, Tile
+
+ROUNDS = 30
+"""Iterations at most of the projection onto the cone, and of tangent and acceleration at rest."""
+ROUND_OFF = 1e-14
+"""A distance from the cone that is none."""
+ON_CONE = 1e-3
+"""Largest distance from the cone of a tangent of a branch."""
+AWAY = 0.1
+"""A velocity that its projection changes by more than this fraction is round-off where the machine hardly moves."""
+SLOWEST = 1e-9
+"""Acceleration along a branch, relative to that without its rows, that is none."""
+SETTLED = 1e-9
+"""Relative change of the acceleration at which the fixed point at rest has converged."""
+VELOCITY, ACCELERATION = 1, 2
+"""What the tangent is: the derivative of the coordinates of this order."""
+
+
+@njit(cache=True, error_model="numpy")
+def follow(
+    tile: Tile,
+    m: Arrays,
+    w: GaussWork,
+    s: LaneWork,
+    t: float,
+    v: Array,
+    forces: Array,
+    lane: int,
+    first: int,
+    tolerance: float,
+) -> tuple[int, bool]:
+    """Add the rows of the branch of one lane to the orthonormal basis of its constraints.
+
+    forces: D^-1/2 L^-1 Q (unknowns, lanes). first: rank of the constraints, whose components are in s.wanted.
+    tolerance: distance from a singular position below which third derivatives apply.
+    Returns the new rank, and whether no branch passes: then nothing accelerates but along the constraints.
+    """
+    width, n = len(tile), m.unknowns
+    speed = 0.0
+    for i in range(n):
+        w.branch[i * width + lane] = v[i * width + lane]
+        speed = max(speed, abs(v[i * width + lane]))
+    if speed > 0.0:
+        rank, off = _approach(tile, m, w, s, t, lane, first, VELOCITY)
+        if rank == first and off <= ON_CONE:
+            return first, False  # redundant everywhere
+        away = _difference(width, n, lane, w.branch, v)
+        if off > ON_CONE or away > AWAY * speed:
+            _accelerate(tile, m, w, s, forces, lane, first)
+            if speed * speed < tolerance * _largest(width, n, lane, w.extra):
+                speed = 0.0
+        if speed > 0.0:
+            rank, _ = _rows(tile, m, w, s, t, lane, first, VELOCITY, False, s.wanted)
+            return rank, False
+    _accelerate(tile, m, w, s, forces, lane, first)
+    size = _largest(width, n, lane, w.extra)
+    for seed in range(-1, n):
+        if seed >= 0:
+            _direct(tile, m, w, s, lane, first, seed)
+        rank, off = _settle(tile, m, w, s, t, forces, lane, first, SLOWEST * size)
+        if off <= ON_CONE:
+            return rank, False
+    return first, True
+
+
+@njit(cache=True, error_model="numpy")
+def _settle(
+    tile: Tile,
+    m: Arrays,
+    w: GaussWork,
+    s: LaneWork,
+    t: float,
+    forces: Array,
+    lane: int,
+    first: int,
+    least: float,
+) -> tuple[int, float]:
+    """Find the tangent along which a machine at rest accelerates, from a direction in w.extra.
+
+    Returns the rank with its rows, and how far from the cone it is; infinite where it accelerates by less than `least`.
+    """
+    width, n = len(tile), m.unknowns
+    rank, off = first, 0.0
+    for _ in range(ROUNDS):
+        for i in range(n):
+            w.branch[i * width + lane] = w.extra[i * width + lane]
+        rank, off = _approach(tile, m, w, s, t, lane, first, ACCELERATION)
+        if off > ON_CONE or rank == first:
+            break
+        rank, _ = _rows(tile, m, w, s, t, lane, first, ACCELERATION, False, s.wanted)
+        _accelerate(tile, m, w, s, forces, lane, rank)
+        size = _largest(width, n, lane, w.extra)
+        if not size > least:
+            return first, np.inf
+        if _difference(width, n, lane, w.branch, w.extra) <= SETTLED * size:
+            break
+    return rank, off
+
+
+@njit(cache=True, error_model="numpy")
+def _direct(tile: Tile, m: Arrays, w: GaussWork, s: LaneWork, lane: int, first: int, number: int) -> None:
+    """Put a direction that the constraints leave free into w.extra: what they leave of one coordinate."""
+    width, n = len(tile), m.unknowns
+    for i in range(n):
+        w.extra[i * width + lane] = 1.0 if i == number else 0.0
+        for j in range(first):
+            w.extra[i * width + lane] -= s.rows[j, number] * s.rows[j, i]
+    sparse.backward(tile, m.pattern, m.mass_factor, m.mass_root, w.extra, 0)
+
+
+@njit(cache=True, error_model="numpy")
+def _approach(
+    tile: Tile, m: Arrays, w: GaussWork, s: LaneWork, t: float, lane: int, first: int, order: int
+) -> tuple[int, float]:
+    """Project the tangent in w.branch onto the cone; returns the rank with its rows, and the distance from the cone."""
+    width, n = len(tile), m.unknowns
+    rank, off, before = first, 0.0, 0.0
+    for number in range(ROUNDS):
+        for k in range(m.constraints.size):
+            s.shift[k] = 0.0
+        before = off
+        rank, off = _rows(tile, m, w, s, t, lane, first, order, True, s.shift)
+        if rank == first or off <= ROUND_OFF or (number > 0 and off <= projection.NEW and off > 0.1 * before):
+            break
+        for i in range(n):
+            total = 0.0
+            for j in range(first, rank):
+                total += s.shift[j] * s.rows[j, i]
+            w.extra[i * width + lane] = total
+        sparse.backward(tile, m.pattern, m.mass_factor, m.mass_root, w.extra, 0)
+        step, size = _largest(width, n, lane, w.extra), _largest(width, n, lane, w.branch)
+        part = min(1.0, size / step) if step > 0.0 else 0.0
+        for i in range(n):
+            w.branch[i * width + lane] += part * w.extra[i * width + lane]
+    return rank, off
+
+
+@njit(cache=True, error_model="numpy")
+def _rows(
+    tile: Tile,
+    m: Arrays,
+    w: GaussWork,
+    s: LaneWork,
+    t: float,
+    lane: int,
+    first: int,
+    order: int,
+    approaching: bool,
+    wanted: Array,
+) -> tuple[int, float]:
+    """Extend the basis by the rows u' C_qq x of the tangent x in w.branch.
+
+    Returns the new rank and the distance of x from the cone, |u' C_qq x x + u' C_tt| relative to the size of its terms.
+    order: VELOCITY or ACCELERATION. approaching: the targets, which go into `wanted`, bring the tangent onto the cone;
+    otherwise they are those of the acceleration. Where no drive moves, x is known up to its length, and rows are taken
+    of u' C_qq x x / |x|^2, whose gradient vanishes along x.
+    """
+    width, n, count, c = len(tile), m.unknowns, m.constraints.size, m.constraints
+    derive(tile, m.derived, w.branch, n, m.held_rows, True)
+    constraints.jacobian(tile, c, w.branch, 0.0, w.turning)
+    driven = False
+    for k in range(count):
+        if c.drive[k] >= 0:
+            driven = driven or functions.evaluate(m.functions, c.drive[k], t, 2) != 0.0
+            driven = driven or (order == VELOCITY and functions.evaluate(m.functions, c.drive[k], t, 1) != 0.0)
+    square = 0.0
+    for i in range(n):
+        square += w.branch[i * width + lane] ** 2
+    size = _largest(width, n, lane, w.branch)
+    rank, off = first, 0.0
+    for number in range(first, count):
+        projection.dependence(number, first, s.triangle, s.norms, s.order, s.weights)
+        bend, kick = 0.0, 0.0
+        for i in range(n * width):
+            w.extra[i] = 0.0
+        for k in range(count):
+            if c.drive[k] >= 0 and order == VELOCITY:
+                bend += s.weights[k] * functions.evaluate(m.functions, c.drive[k], t, 2)
+                kick += s.weights[k] * functions.evaluate(m.functions, c.drive[k], t, 3)
+            for e in range(c.entry[k], c.entry[k + 1]):
+                w.extra[c.column[e] * width + lane] += s.weights[k] * w.turning[e * width + lane]
+        pace = constraints.pace(tile, c, s.weights, w.branch, lane)
+        if not _largest(width, n, lane, w.extra) > STILL * pace:
+            continue
+        value = 0.0
+        for i in range(n):
+            value += w.extra[i * width + lane] * w.branch[i * width + lane]
+            w.moved[i * width + lane] = w.extra[i * width + lane]
+        # What is left of a row counts beside the tangent that it is made of, whose round-off it has.
+        share = projection.NEW * pace / _largest(width, n, lane, w.extra)
+        sparse.forward(tile, m.pattern, m.mass_factor, m.mass_root, w.extra, 0)
+        if not _is_new(width, n, lane, first, s, w.extra, share):
+            continue
+        off = max(off, abs(value + bend) / (pace * size))
+        share *= _largest(width, n, lane, w.moved)
+        for i in range(n):
+            along = 0.0 if driven else value / square * w.branch[i * width + lane]
+            w.extra[i * width + lane] = w.moved[i * width + lane] - along
+        if approaching:
+            target = -0.5 * (value + bend)
+        elif order == VELOCITY:
+            target = -kick / 3.0
+        else:
+            target = value if driven else 0.0
+        share /= _largest(width, n, lane, w.extra)
+        sparse.forward(tile, m.pattern, m.mass_factor, m.mass_root, w.extra, 0)
+        for i in range(n):
+            s.row[i] = w.extra[i * width + lane]
+        rank = projection.extend(rank, s.rows, wanted, s.row, target, share)
+    return rank, off
+
+
+@njit(cache=True, error_model="numpy")
+def _is_new(width: int, n: int, lane: int, first: int, s: LaneWork, row: Array, share: float) -> bool:
+    """Return whether more than this share of a row of one lane is independent of the constraints."""
+    for i in range(n):
+        s.row[i] = row[i * width + lane]
+    length = projection.dot(s.row, s.row)
+    for j in range(first):
+        part = projection.dot(s.rows[j], s.row)
+        for i in range(n):
+            s.row[i] -= part * s.rows[j, i]
+    return projection.dot(s.row, s.row) > share * share * length  # type: ignore[no-any-return]
+
+
+@njit(cache=True, error_model="numpy")
+def _accelerate(tile: Tile, m: Arrays, w: GaussWork, s: LaneWork, forces: Array, lane: int, rank: int) -> None:
+    """The acceleration of one lane by the rows of the basis so far, into w.extra."""
+    width, n = len(tile), m.unknowns
+    for i in range(n):
+        s.row[i] = forces[i * width + lane]
+    for j in range(rank):
+        gap = s.wanted[j] - projection.dot(s.rows[j], s.row)
+        for i in range(n):
+            s.row[i] += gap * s.rows[j, i]
+    for i in range(n):
+        w.extra[i * width + lane] = s.row[i]
+    sparse.backward(tile, m.pattern, m.mass_factor, m.mass_root, w.extra, 0)
+
+
+@njit(cache=True, error_model="numpy")
+def _largest(width: int, n: int, lane: int, x: Array) -> float:
+    """The largest entry of one lane by size."""
+    largest = 0.0
+    for i in range(n):
+        largest = max(largest, abs(x[i * width + lane]))
+    return largest
+
+
+@njit(cache=True, error_model="numpy")
+def _difference(width: int, n: int, lane: int, x: Array, y: Array) -> float:
+    """The largest difference of entries of one lane."""
+    largest = 0.0
+    for i in range(n):
+        largest = max(largest, abs(x[i * width + lane] - y[i * width + lane]))
+    return largest
