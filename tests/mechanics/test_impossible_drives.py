@@ -24,7 +24,7 @@ def end(name: str) -> dict[str, Any]:
 
 
 def ended(run: Any) -> float:
-    """The instant that the message tells [s]."""
+    """Return the instant in a message [s]."""
     return float(run.message.split("from t = ")[1].split(" s on")[0])
 
 
@@ -104,7 +104,7 @@ def test_lanes_end_each_at_its_own_dead_centre(seed: int) -> None:
 
 
 def contradiction(rng: np.random.Generator) -> tuple[dict[str, Any], float]:
-    """Two bodies welded together whose angle, or distance, is driven as well, in so many seconds."""
+    """Return two welded bodies whose angle or distance is driven as well, and the rise time [s]."""
     most, rise = rng.uniform(0.1, 0.7), rng.uniform(0.1, 0.5)
     one, other = GROUND, {"body": "a"}
     weld = {"kind": "weld", "first": end("a"), "second": {"body": "b"}}

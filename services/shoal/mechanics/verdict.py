@@ -127,7 +127,7 @@ class Limits:
         return Status.OK, ""
 
     def _open(self, numbers: Array) -> str:
-        """Which joint the positions cannot close, from when on, and what may be the cause."""
+        """Name the joint that no position closes, since when, and the likely cause."""
         field = self._field(self._model.constraint_names[int(numbers[UNCLOSED])])
         cause = REACH if self._driven else "use a smaller step"
         return f"constraints are violated: {field} cannot be closed {self._since(numbers[ENDED])}; {cause}"
