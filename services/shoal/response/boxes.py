@@ -18,7 +18,7 @@ from shoal.response.extremes import MOST_CORNERS, Each, Extremes, along, corners
 from shoal.response.inputs import BoolArray, Inputs
 from shoal.response.kept import TimeIsUpError
 from shoal.response.statistics import DRAWN, QUANTILES
-from shoal.response.study import SAFETY, Found, Study
+from shoal.response.study import FINE_GAP, SAFETY, Found, Study
 from shoal.trajectory import Array
 
 SEARCHED = 1024
@@ -33,6 +33,9 @@ HOPELESS = 0.1
 """Instants whose gap is above this share of the scatter lie beyond the horizon."""
 NOTHING = 0.01
 """Of the largest deviation: at interval values with less, the shares of that are not looked at."""
+COARSE, LITTLE = 0.05, 0.1
+"""Share of a deviation above which its error calls for runs over the random parameters alone; at instants where it is
+below `LITTLE` of its largest, of that."""
 PLACES, INNER = 8, 128
 """Interval values that are looked at beyond it, and runs at each."""
 
@@ -58,7 +61,8 @@ class Boxes:
     horizon: the last instant up to which they are known [s], infinite if they always are; places, inner: interval
     values that were looked at beyond it, and runs at each; shares: of each random parameter the least and the largest
     first and total Sobol index, (2 indices, 2 sides, random parameters, columns), nan beyond the horizon, where nothing
-    varies, and of parameters that correlate
+    varies, of parameters that correlate, and where inner studies tell the deviation; std_gap: the same distance as
+    `gap` for the deviation alone, as a share of the deviation (see `std_gap`)
     """
 
     names: tuple[str, ...]
@@ -70,6 +74,7 @@ class Boxes:
     places: int = 0
     inner: int = 0
     shares: Array | None = None
+    std_gap: float = 0.0
 
     def named(self) -> dict[str, Ends]:
         """Every statistic by its name."""
@@ -99,7 +104,27 @@ def boxes_of(study: Study, found: Found) -> Boxes:
     largest = float(within.max()) if within.size else math.nan
     shares = _shares(of, study, sides[1])
     shares[..., study.instants > end] = np.nan
-    return Boxes(tuple(of.intervals.names), mean, std, tuple(told), largest, end, shares=shares)
+    apart = std_gap(study, std, end)
+    return Boxes(tuple(of.intervals.names), mean, std, tuple(told), largest, end, shares=shares, std_gap=apart)
+
+
+def _std_gaps(study: Study, std: Ends) -> Array:
+    """Distance of outer bounds of the deviation from attained ones, as a share of the deviation, (columns,)."""
+    off = np.maximum(std.lower - std.lower_outer, std.upper_outer - std.upper)
+    scale = np.maximum(std.upper, LITTLE * study.largest(std.upper, study.runs.values))
+    # A deviation that is nothing compared with what the answers differ by is none.
+    some = std.upper_outer > FINE_GAP * study.widths(study.runs.values)
+    return np.divide(off, scale, out=np.zeros_like(off), where=(scale > 0) & some)
+
+
+def coarse(study: Study, std: Ends) -> BoolArray:
+    """Where the error of the deviation is too large a share of it, (columns,)."""
+    return np.asarray(_std_gaps(study, std) > COARSE)
+
+
+def std_gap(study: Study, std: Ends, horizon: float) -> float:
+    """The largest distance of outer bounds from attained ones within the horizon, as a share of the deviation."""
+    return float(_std_gaps(study, std)[study.instants <= horizon].max(initial=0.0))
 
 
 def _shares(of: Conditional, study: Study, std: Extremes) -> Array:

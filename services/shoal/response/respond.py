@@ -13,6 +13,7 @@ from shoal.errors import InputError
 from shoal.response.attained import DRAWN, bounds_of, likely
 from shoal.response.boxes import Boxes, boxes_of, sampled
 from shoal.response.expansion import Expansion
+from shoal.response.inner import resolved
 from shoal.response.inputs import Inputs
 from shoal.response.kept import TimeIsUpError
 from shoal.response.methods import get_method
@@ -99,7 +100,10 @@ def respond(
         with suppress(TimeIsUpError):
             bounds = likely(study, bounds)
     statistics = _statistics(study, found) if random.all() else None
-    boxes = boxes_of(study, found) if inputs.mixed else None
+    boxes = None
+    if inputs.mixed:
+        boxes, how = resolved(study, boxes_of(study, found))
+        found = replace(found, why=f"{found.why}; where it does not resolve deviations, {how}") if how else found
     if boxes is not None and math.isfinite(boxes.horizon):
         with suppress(TimeIsUpError):
             boxes = sampled(study, boxes)

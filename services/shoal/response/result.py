@@ -56,10 +56,10 @@ class Bounds:
 class Response:
     """How the markers of a scene may move.
 
-    status: ok, gap-not-reached, beyond-horizon, failed-runs or model-rejected; message: why it is not ok; why: what the
-    method did; times: instants [s]; markers: names; horizon: up to when bounds hold [s]; bounds: None if a parameter is
-    random; statistics: None unless all are; boxes: bounds of the statistics, if only some are; columns are (instants,
-    markers, quantities) in this order;
+    status: ok, gap-not-reached, beyond-horizon, deviation-in-doubt, failed-runs or model-rejected; message: why it is
+    not ok; why: what the method did; times: instants [s]; markers: names; horizon: up to when bounds hold [s]; bounds:
+    None if a parameter is random; statistics: None unless all are; boxes: bounds of the statistics, if only some are;
+    columns are (instants, markers, quantities) in this order;
     errors: of the markers in extremal runs [m], empty where not estimated; model: the same of every column, by which
     outer bounds and errors of statistics are wider, (columns,); stated: the scene with its model in the
     middle; engine: its name; limits: of what must not happen;
@@ -291,6 +291,7 @@ class Response:
             "wall_s": self.wall_s,
             "horizon": plain(self.horizon),
             "gap": None if (bounded := self.bounds or self.boxes) is None else plain(bounded.gap),
+            **({} if self.boxes is None else {"std_gap": plain(self.boxes.std_gap)}),
             "parameters": self._parameters(),
             "left_out": {name: why for joint in self.inputs.joints for name, why in joint.left.items()},
             "bounds": {} if self.bounds is None else self._by_marker(self._bounds),

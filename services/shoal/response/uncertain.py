@@ -30,6 +30,7 @@ from shoal.response.allocation import (
 from shoal.response.allocation_of_random import of_random
 from shoal.response.attained import DRAWN
 from shoal.response.between import between
+from shoal.response.boxes import HOPELESS
 from shoal.response.finer import repeated
 from shoal.response.inputs import Correlations, Inputs, Parameter
 from shoal.response.kept import Keep, TimeIsUpError
@@ -331,6 +332,11 @@ def _status(answer: Answer, gap: float | None, rejected: str, judged: Sequence[J
     if bounds is not None and gap is not None and not bounds.gap <= gap:
         found = "is not known" if math.isnan(bounds.gap) else f"is {bounds.gap:.1e} of the width"
         return "gap-not-reached", f"the gap between outer and attained bounds {found}, asked for {gap:g}"
+    if answer.boxes is not None and answer.boxes.std_gap > HOPELESS:
+        return "deviation-in-doubt", (
+            f"deviations are known to {answer.boxes.std_gap:.1e} of their size only, within the outer values; more "
+            "runs or narrower intervals tell more"
+        )
     doubts = [one.doubt for one in judged if one.doubt]
     if doubts:
         return "limit-in-doubt", "; ".join(doubts)

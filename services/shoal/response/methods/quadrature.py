@@ -60,7 +60,7 @@ def _agreeing(study: Study, levels: tuple[int, ...]) -> Found | None:
         if min(inputs.highest(count)) < count or runs.left < count ** len(inputs) + CONTROLS:
             return None
         made = runs.evaluations
-        germs, weights = _rule(inputs, count)
+        germs, weights = rule(inputs, count)
         try:
             runs.all(germs)
         except TimeIsUpError:
@@ -104,7 +104,7 @@ def _controlled(study: Study, found: Expansion, apart: Array, count: int) -> Fou
     return Found(why, found, missed, errors=(error, error), drawn=CONTROLS)
 
 
-def _rule(inputs: Inputs, count: int) -> tuple[Array, Array]:
+def rule(inputs: Inputs, count: int) -> tuple[Array, Array]:
     """Germs, (runs, parameters), and weights, (runs,), of the tensor product."""
     rules = [gauss(inputs.recurrence(k), count) for k in range(len(inputs))]
     axes = np.meshgrid(*(nodes for nodes, _ in rules), indexing="ij")

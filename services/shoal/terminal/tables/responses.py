@@ -86,10 +86,11 @@ def response_table(response: Response) -> None:
                 f"{response.controls} of the runs lie all over the box: what is told may be otherwise in "
                 f"{100 * response.unseen:.2g} % of it at most, with 95 % confidence"
             )
-    if response.boxes is not None:
+    if (boxes := response.boxes) is not None:
         screen.say(
             f"statistics {looked_at(response.times)} lie between these values, whatever the intervals are; they are "
-            f"known to {response.boxes.gap:.1e} of the scatter{_by_model(response)}, until {response.horizon:g} s"
+            f"known to {boxes.gap:.1e} of the scatter, deviations to {boxes.std_gap:.1e} of their size"
+            f"{_by_model(response)}, until {response.horizon:g} s"
         )
     if response.errors.estimates:
         screen.say(f"estimated error of the runs that decide: {response.errors}")
