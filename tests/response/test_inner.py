@@ -111,3 +111,20 @@ def test_a_deviation_that_takes_more_runs_is_in_doubt() -> None:
     within = answer.boxes.std.upper_outer[: int(min(answer.horizon, 2))]
     assert np.all(within > deviation.max(axis=0)[: len(within)])
     assert answer.boxes.std_gap > 0.1 or np.isfinite(answer.horizon)
+
+
+def test_runs_are_left_for_what_lies_beyond_the_horizon() -> None:
+    """A deviation that takes an inner study, and the logistic map, which no polynomial tells."""
+
+    def function(v: Values) -> Array:
+        x = 0.3 + 0.1 * v["k"] + 1e-3 * v["a"]
+        for _ in range(40):
+            x = 4 * x * (1 - x)
+        return np.stack([np.sin(5 * v["k"]) + 1e-4 * v["a"] * (2 + v["k"]), x], axis=1)
+
+    answer = told(function, {"k": Interval(-1.0, 1.0), "a": Normal(0.0, 1.0)}, most=4000)
+    found = answer.boxes
+    assert found is not None
+    assert answer.horizon == 1.0
+    assert found.places >= 3
+    assert (found.std.lower[0], found.std.upper[0]) == pytest.approx((1e-4, 3e-4), rel=0.02)

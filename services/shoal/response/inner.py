@@ -14,7 +14,7 @@ import numpy as np
 
 from shoal.errors import ComputationError, InputError
 from shoal.response.attained import bounds_of
-from shoal.response.boxes import Boxes, Ends, coarse, std_gap
+from shoal.response.boxes import INNER, PLACES, Boxes, Ends, coarse, std_gap
 from shoal.response.inputs import BoolArray, Inputs, IntArray
 from shoal.response.kept import TimeIsUpError
 from shoal.response.methods.bounds import bounds
@@ -144,7 +144,8 @@ def resolved(study: Study, boxes: Boxes) -> tuple[Boxes, str]:
     if not len(columns):
         return boxes, ""
     try:
-        mean, std, how = _bounded(study, columns)
+        # Beyond the horizon, drawn runs are needed.
+        mean, std, how = _bounded(study, columns, PLACES * INNER if np.isfinite(boxes.horizon) else 0)
     except (TooManyRunsError, TimeIsUpError, InputError, ComputationError):
         # What far places of a rule state may be impossible.
         return boxes, ""
@@ -156,17 +157,17 @@ def resolved(study: Study, boxes: Boxes) -> tuple[Boxes, str]:
     return replace(boxes, mean=_within(boxes.mean, columns, mean), std=std, shares=shares, std_gap=gap), how
 
 
-def _bounded(study: Study, columns: IntArray) -> tuple[Ends, Ends, str]:
+def _bounded(study: Study, columns: IntArray, spared: int) -> tuple[Ends, Ends, str]:
     """Bound mean and deviation of some columns by a study of the intervals alone; also returns how, in words.
 
-    Raises TooManyRunsError, TimeIsUpError, InputError, ComputationError.
+    spared: runs that are left for others. Raises TooManyRunsError, TimeIsUpError, InputError, ComputationError.
     """
     intervals, inner = study.inputs.some(~study.inputs.random), Inner(study, columns)
     tried = np.vstack([np.zeros(len(intervals)), intervals.sobol(PROBES, study.seed + 9)])
-    apart = inner.settle(intervals.values(tried), study.runs.left // SHARE)
+    apart = inner.settle(intervals.values(tried), (study.runs.left - spared) // SHARE)
     if apart is None or inner.rule is None:
         raise TooManyRunsError
-    runs = Runs(inner, intervals, study.runs.left // len(inner.rule.germs))
+    runs = Runs(inner, intervals, (study.runs.left - spared) // len(inner.rule.germs))
     # The variance is smooth where the deviation has a kink.
     groups = np.concatenate([study.groups[columns], study.groups[columns] + study.groups.max() + 1])
     outer = Study(runs, groups, np.tile(study.instants[columns], 2), study.seed, GAP)
