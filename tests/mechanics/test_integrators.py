@@ -16,7 +16,6 @@ from shoal.mechanics.assembly.build import build
 from shoal.mechanics.integrators import INTEGRATORS, Choice, facts
 from shoal.mechanics.machine import check_step
 from shoal.mechanics.simulate import simulate
-from shoal.mechanics.warm import WIDE
 from shoal.scene import Scene, load_scene
 from shoal.trajectory import Status
 
@@ -28,7 +27,7 @@ EXPLICIT = [name for name in FIXED if facts(name).explicit]
 every = pytest.mark.parametrize("integrator", ALL)
 # Tiles of lanes of the others are compiled here first, which takes its time.
 every_in_lanes = pytest.mark.parametrize(
-    "integrator", [pytest.param(name, marks=() if name in WIDE else pytest.mark.slow) for name in ALL]
+    "integrator", [pytest.param(name, marks=() if facts(name).warm_lanes else pytest.mark.slow) for name in ALL]
 )
 RIGID = load_scene("rigid-double-pendulum").with_values({"joints.A.friction": 0.5, "initial.AB.rate": 1.0})
 # Cables soft enough that every frequency is resolved by the steps below (the highest are 59 and 116 rad/s).

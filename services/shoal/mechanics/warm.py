@@ -24,16 +24,13 @@ from shoal.mechanics import clock, gates
 from shoal.mechanics.assembly.build import build
 from shoal.mechanics.compilation import SECONDS, described
 from shoal.mechanics.dynamics import work_space
-from shoal.mechanics.integrators import INTEGRATORS, choose, halting
+from shoal.mechanics.integrators import INTEGRATORS, choose, facts, halting
 from shoal.mechanics.march import loop
 from shoal.mechanics.marched import frame_type, framed
 from shoal.mechanics.notes import Note, telling
 from shoal.mechanics.numerics.tile import tiles
 from shoal.mechanics.simulate import simulate
 from shoal.scene import Scene, load_scene
-
-WIDE = ("leapfrog", "rk4", "dop853", "generalized-alpha")
-"""Integrators of which tiles of lanes are compiled ahead; the others compile theirs when they are first asked to."""
 
 
 class Kernel(NamedTuple):
@@ -157,7 +154,7 @@ def _compile(kernel: Kernel) -> str:
 
 
 def _lanes(name: str) -> tuple[int, ...]:
-    return (1, 2) if name in WIDE else (1,)
+    return (1, 2) if facts(name).warm_lanes else (1,)
 
 
 def _pendulum(integrator: str) -> Scene:

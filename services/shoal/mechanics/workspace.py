@@ -21,8 +21,6 @@ from shoal.mechanics.numerics.tile import Array, Tile, pack
 from shoal.scene import Solver
 
 T = TypeVar("T")
-DENSE = ("radau5",)
-"""Integrators that hold constraints by dense matrices, however many there are."""
 _LINE = 8
 """Numbers in a line of the processor's cache."""
 
@@ -83,7 +81,7 @@ class Workspace:
             )
         self._model, self._part, self._tile = model, part, tile
         arrays, room = at_start(model, tile, part)
-        if seek is None and choice.name not in DENSE:
+        if seek is None and facts(choice.name).sparse_constraints:
             room = lean(arrays, room)
         if spare:
             arrays = arrays._replace(elements=tuple(family._replace(spare=spare) for family in arrays.elements))

@@ -36,8 +36,6 @@ INTEGRATORS: dict[str, Any] = {
 }
 
 
-BY_ACCELERATION = ("dop853", "radau5", "rk4", "leapfrog")
-"""Those that know a machine by its acceleration alone, and so whatever that depends on."""
 FOLLOWED = 100.0
 """So many steps of a Runge-Kutta method may take the place of one, to follow the modes of bodies, which last."""
 STRIDES = 100
@@ -84,11 +82,9 @@ def choose(solver: Solver, model: Model, tile: Tile, lanes: slice, name: str | N
         # A machine at rest must not leap over what a drive does later.
         solver = solver.model_copy(update={"max_step": solver.duration / STRIDES})
     name = name or solver.integrator
-    if model.rubbing.size and name not in BY_ACCELERATION:
-        raise InputError(
-            f"solver.integrator: {name} knows no friction by the forces of joints (mu); "
-            f"use {' or '.join(BY_ACCELERATION)}"
-        )
+    if model.rubbing.size and not facts(name).constraint_forces:
+        others = " or ".join(other for other in INTEGRATORS if facts(other).constraint_forces)
+        raise InputError(f"solver.integrator: {name} knows no friction by the forces of joints (mu); use {others}")
     return INTEGRATORS[name].settings(solver, model, tile, lanes)
 
 

@@ -48,6 +48,10 @@ FACTS = Facts(
     order=8,
     explicit=True,
     adaptive=True,
+    constraint_forces=True,
+    sparse_constraints=True,
+    warm_lanes=True,
+    stages=12,
     good_for="rigid machines, and references: any accuracy for few evaluations where nothing is stiff",
 )
 

@@ -45,6 +45,8 @@ class EnergyMomentum(NamedTuple):
 FACTS = Facts(
     order=2,
     explicit=False,
+    sparse_constraints=True,
+    seconds_per_unknown=(6e-6, 6e-6),
     conserves=True,
     mean_power=True,
     good_for="long free motion of stiff elastic machines: their energy stays what it was at any step",

@@ -39,6 +39,9 @@ class GeneralizedAlpha(NamedTuple):
 FACTS = Facts(
     order=2,
     explicit=False,
+    sparse_constraints=True,
+    warm_lanes=True,
+    seconds_per_unknown=(6e-6, 6e-6),
     good_for="stiff elastic machines at steps that do not resolve their fast vibrations, damped as one wishes",
 )
 

@@ -43,6 +43,8 @@ class ImplicitGauss(NamedTuple):
 FACTS = Facts(
     order=1,
     explicit=False,
+    sparse_constraints=True,
+    seconds_per_unknown=(6e-6, 6e-6),
     mean_power=True,
     good_for="coming to rest: it damps all vibrations, keeps joints closed and survives any step",
 )

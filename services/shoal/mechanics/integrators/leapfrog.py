@@ -31,6 +31,9 @@ class Leapfrog(NamedTuple):
 FACTS = Facts(
     order=2,
     explicit=True,
+    constraint_forces=True,
+    sparse_constraints=True,
+    warm_lanes=True,
     good_for="elastic machines whose fast vibrations are resolved: the cheapest step, and no loss of energy",
     stable_step_times_frequency=2.0,
     stable_step_times_decay=1.0,

@@ -82,6 +82,8 @@ FACTS = Facts(
     order=5,
     explicit=False,
     adaptive=True,
+    constraint_forces=True,
+    seconds_per_unknown=(1.5e-5, 1.5e-5),
     good_for="stiff machines to a known accuracy: fast vibrations and strong damping do not limit its step",
 )
 

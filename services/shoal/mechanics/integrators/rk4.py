@@ -25,6 +25,9 @@ class Rk4(NamedTuple):
 FACTS = Facts(
     order=4,
     explicit=True,
+    constraint_forces=True,
+    sparse_constraints=True,
+    warm_lanes=True,
     good_for="smooth motion at a fixed step, where a known step matters more than a known error",
     stable_step_times_frequency=2.828,
     stable_step_times_decay=2.785,

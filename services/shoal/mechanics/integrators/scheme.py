@@ -21,12 +21,25 @@ from shoal.mechanics.numerics.tile import Array, Tile
 
 
 class Facts(NamedTuple):
-    """What an integrator promises.
+    """Declared properties of an integrator; what the rest of the library knows of it.
 
-    order: in time. stable_step_times_frequency, stable_step_times_decay: the largest stable step times the
-    highest frequency and times the fastest decay rate. adaptive: chooses its steps by its tolerances.
-    conserves: the energy of a frictionless machine stays what it was, but for round-off and Newton's tolerance.
-    mean_power: w.power is the mean over the step, by which the energy balance is as exact as that; else at its end.
+    Attributes:
+        order: in time
+        explicit: solves no equations for the end of the step but those of the constraints
+        good_for: its use, in one line
+        stable_step_times_frequency, stable_step_times_decay: the largest stable step times the highest frequency and
+            times the fastest decay rate
+        adaptive: chooses its steps by its tolerances
+        conserves: the energy of a frictionless machine is constant up to round-off and Newton's tolerance
+        mean_power: w.power is the mean over the step, by which the energy balance is as exact as that; else at its end
+        constraint_forces: its accelerations are those of Gauss's principle, so that friction may depend on the forces
+            of constraints
+        sparse_constraints: never touches the dense matrices of the constraints where these are many, so that a run has
+            no room for them
+        warm_lanes: `make kernels` compiles it for tiles of lanes as well
+        seconds_per_unknown: cost of a step without and with constraints, by order of magnitude on one core [s]; it
+            only decides what is affordable, so that no answer depends on the load of the machine
+        stages: evaluations by which the cost of a step is multiplied where a number of steps is to be afforded
     """
 
     order: int
@@ -37,6 +50,11 @@ class Facts(NamedTuple):
     adaptive: bool = False
     conserves: bool = False
     mean_power: bool = False
+    constraint_forces: bool = False
+    sparse_constraints: bool = False
+    warm_lanes: bool = False
+    seconds_per_unknown: tuple[float, float] = (2e-8, 4e-7)
+    stages: int = 1
 
 
 def advance(tile: Tile, scheme: Any, m: Arrays, w: Work, t: float, h: float) -> float:

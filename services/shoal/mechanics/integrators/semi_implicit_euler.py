@@ -27,6 +27,7 @@ class SemiImplicitEuler(NamedTuple):
 FACTS = Facts(
     order=1,
     explicit=True,
+    sparse_constraints=True,
     mean_power=True,
     good_for="repeating the paper; every other explicit method is more accurate at the same cost",
     stable_step_times_frequency=2.0,
