@@ -36,9 +36,29 @@ from shoal.scene import (
 from shoal.scene.joints import CoupledCoordinate
 from shoal.scene.record import Vector3
 
+UnitVectors = dict[str, Any]
+"""By the name of an unknown force or torque, at every sample, (samples, d) each."""
+
+
+class JointCondition:
+    """A condition of a joint between two places, with the forces that keep it.
+
+    They act on the second body at the second place, and oppositely on the first body there, and do no work in any
+    motion that the condition permits. A name in both mappings is one unknown, a force and a torque in proportion.
+    motion: of the free bodies, an `analysis.free_motion.FreeMotion`
+    """
+
+    def pushes(self, motion: Any) -> UnitVectors:
+        """Return the forces per unit."""
+        return {}
+
+    def twists(self, motion: Any) -> UnitVectors:
+        """Return the torques per unit."""
+        return {}
+
 
 @dataclass(frozen=True)
-class Meet:
+class Meet(JointCondition):
     """Two places coincide. held: by constraints, as somebody wants to know the force."""
 
     first: Attachment
@@ -50,9 +70,13 @@ class Meet:
         """Whether both are of one body: a rod that closes upon itself."""
         return self.first.body == self.second.body
 
+    def pushes(self, motion: Any) -> UnitVectors:
+        """Return the forces along the axes of the ground."""
+        return {f"f{name}": axis for name, axis in zip("xyz", motion.axes, strict=False)}
+
 
 @dataclass(frozen=True)
-class Along:
+class Along(JointCondition):
     """The second place stays on a line through the first; direction: of the line in the first body's frame [rad].
 
     In space the direction may be an axis as it points at the start. held: by a constraint, as somebody wants to know
@@ -69,18 +93,30 @@ class Along:
         """Whether the line rests on the ground."""
         return self.first.body == GROUND and not isinstance(self.first.point, str) and not self.held
 
+    def pushes(self, motion: Any) -> UnitVectors:
+        """Return the forces across the line."""
+        normals = motion.normals(motion.line(self.first, self.direction))
+        names = ["normal"] if len(normals) == 1 else ["normal1", "normal2"]
+        return dict(zip(names, normals, strict=True))
+
 
 @dataclass(frozen=True)
-class Apart:
+class Apart(JointCondition):
     """Two places keep a distance [m]; None: that of the start."""
 
     first: Attachment
     second: Attachment
     length: Function | None
 
+    def pushes(self, motion: Any) -> UnitVectors:
+        """Return the force from place to place; of places that coincide, along the first axis."""
+        way = motion.gap(self)
+        length = np.linalg.norm(way, axis=1, keepdims=True)
+        return {"axial": np.where(length > 0, way / np.where(length > 0, length, 1.0), motion.axes[0])}
+
 
 @dataclass(frozen=True)
-class Turned:
+class Turned(JointCondition):
     """The angle [rad] from the first direction to the second is kept, or follows a function of time.
 
     either: two angles, of which the one nearer to the start is kept. Without an angle it is that of the start.
@@ -107,9 +143,13 @@ class Turned:
             return np.where(np.cos(ahead - self.either[0]) >= -1e-12, *self.either)
         return ahead if self.angle is None else self.angle
 
+    def twists(self, motion: Any) -> UnitVectors:
+        """Return the torques about all axes."""
+        return dict(motion.turns)
+
 
 @dataclass(frozen=True)
-class Geared:
+class Geared(JointCondition):
     """Whole numbers times the angles of directions add up to what they do at the start, or differ by whole turns.
 
     So teeth do that mesh: of gears with m and n teeth m turns of one are n turns of the other. axes: in space, what
@@ -132,7 +172,7 @@ class Geared:
 
 
 @dataclass(frozen=True)
-class Sum:
+class Sum(JointCondition):
     """The sum of factor * coordinate follows a function of time [m]."""
 
     terms: tuple[CoupledCoordinate, ...]
@@ -140,16 +180,23 @@ class Sum:
 
 
 @dataclass(frozen=True)
-class Aligned:
+class Aligned(JointCondition):
     """An axis of both bodies; None: the first body's x axis, parallel to the second's, whichever way that points."""
 
     first: Attachment
     second: Attachment
     axis: Vector3 | None
 
+    def twists(self, motion: Any) -> UnitVectors:
+        """Return the torques across the axis; two cables, which have slopes only, hold no other axis than those."""
+        if self.axis is not None and motion.is_cable(self.first.body) and motion.is_cable(self.second.body):
+            return {}
+        across = motion.normals(motion.common_axis(self.first, self.second, self.axis))
+        return dict(zip(("m1", "m2"), across, strict=True))
+
 
 @dataclass(frozen=True)
-class Square:
+class Square(JointCondition):
     """An axis of the first body stays at a right angle to one of the second; None: their x axes."""
 
     first: Attachment
@@ -157,24 +204,37 @@ class Square:
     axis: Vector3 | None
     second_axis: Vector3 | None
 
+    def twists(self, motion: Any) -> UnitVectors:
+        """Return the torque across both axes."""
+        across = np.cross(motion.axis(self.first, self.axis), motion.axis(self.second, self.second_axis))
+        return {"m1": across / np.linalg.norm(across, axis=1, keepdims=True)}
+
 
 @dataclass(frozen=True)
-class InPlane:
+class InPlane(JointCondition):
     """The second place stays in a plane through the first, normal to an axis of the first body."""
 
     first: Attachment
     second: Attachment
     axis: Vector3
 
+    def pushes(self, motion: Any) -> UnitVectors:
+        """Return the force across the plane."""
+        return {"normal": motion.held_axis(self.first.body, self.axis)}
+
 
 @dataclass(frozen=True)
-class Hinged:
+class Hinged(JointCondition):
     """The angle [rad] from the first body's direction to the second's about an axis of both follows a function."""
 
     first: Attachment
     second: Attachment
     angle: Function
     axis: Vector3
+
+    def twists(self, motion: Any) -> UnitVectors:
+        """Return the torque about the axis."""
+        return {"m1": motion.common_axis(self.first, self.second, self.axis)}
 
 
 Condition = Meet | Along | Apart | Turned | Geared | Sum

@@ -1,24 +1,30 @@
-"""The unknowns of joints on free bodies: what the forces of a plane and of space have in common."""
+"""Unknown forces of joints on free bodies, their friction, and the displacements whose work has to vanish.
+
+A condition of a joint says which unit forces and torques it can exert (`joints`: pushes, twists); none of them does
+work in a motion that the condition permits.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from shoal.mechanics import joints, plane
 from shoal.mechanics.affine import Affine
-from shoal.mechanics.analysis.evaluate import points
-from shoal.mechanics.analysis.free_bodies import FreeBodies
-from shoal.mechanics.joints import Apart, Meet, Sum, unknown
+from shoal.mechanics.analysis.free_motion import FreeMotion
+from shoal.mechanics.frames import BeamFrame, Frame, ModalFrame, PointFrame
+from shoal.mechanics.joints import Geared, Sum
 from shoal.mechanics.numerics.tile import Array
-from shoal.scene import Attachment, Revolute, Slider
+from shoal.scene import Revolute, Slider
 
 
 class Component(NamedTuple):
-    """One unknown of a joint: its work per displacement of the free bodies, (unknowns,).
+    """One unknown of a joint per unit [N or N m], at every sample.
 
-    force [N], torque [N m]: what it is per unit, (d,) and (1,) or in space (3,).
+    gradient: its work per displacement of the free bodies, (samples, unknowns); force, torque: on the second body,
+    (samples, d) and (samples, 1 or in space 3)
     """
 
     joint: str
@@ -29,80 +35,176 @@ class Component(NamedTuple):
 
     @property
     def turns(self) -> bool:
-        """Whether it is a torque."""
-        return bool(np.any(self.torque))
+        """Whether it is a torque alone."""
+        return bool(np.any(self.torque) and not np.any(self.force))
+
+    def times(self, factor: Array) -> Component:
+        """Return it scaled at every sample, (samples,)."""
+        scaled = (factor[:, None] * part for part in (self.gradient, self.force, self.torque))
+        return Component(self.joint, self.name, *scaled)
 
 
-class Rubbing(NamedTuple):
-    """What the friction of a joint acts on: the derivative of its slip, (unknowns,), and force and torque per unit."""
-
-    gradient: Array
-    force: Array
-    torque: Array
+def components(motion: FreeMotion) -> list[Component]:
+    """Return the unknowns of all joints, in the order of the scene."""
+    return [part for name, one in joints.of_scene(motion.scene) for part in _of_condition(motion, name, one)]
 
 
-Friction = tuple[Array, dict[str, tuple[Array, Array]]]
-"""Generalised force of all joint friction, (unknowns,), and force and torque of each joint's on its second body."""
+def _of_condition(motion: FreeMotion, name: str, condition: Any) -> Iterator[Component]:
+    if isinstance(condition, Geared):
+        yield _geared(motion, name, condition)
+    elif isinstance(condition, Sum):
+        yield _coupled(motion, name, condition)
+    else:
+        pushes = condition.pushes(motion)
+        twists = _resisted(motion, condition, condition.twists(motion))
+        for label in pushes | twists:
+            yield _pair(motion, name, label, condition, pushes.get(label), twists.get(label))
 
 
-def friction(
-    bodies: FreeBodies,
-    at: Array,
-    rate: Array,
-    rubbing: Callable[[FreeBodies, Revolute | Slider, Array], Rubbing],
-    held: Mapping[str, float],
-) -> Friction:
-    """Of all joints. held: the force of those [N] whose friction depends on it."""
-    total = np.zeros(bodies.unknowns)
-    each: dict[str, tuple[Array, Array]] = {}
-    for name, joint in bodies.scene.joints.items():
-        if isinstance(joint, Revolute | Slider) and joint.resists:
-            gradient, force, torque = rubbing(bodies, joint, at)
-            against = -float(joint.resistance(gradient @ rate, held.get(name, 0.0)))
-            total += against * gradient
-            each[name] = against * force, against * torque
-    return total, each
+def _pair(
+    motion: FreeMotion, joint: str, label: str, sides: Any, force: Array | None, torque: Array | None
+) -> Component:
+    """Return a force at the second place and a torque on the second body, and their opposites on the first.
+
+    sides: a condition or a joint between two places
+    """
+    samples = len(motion.at)
+    gradient = np.zeros((samples, motion.bodies.unknowns))
+    if force is not None:
+        gradient = gradient + _along(force, motion.sliding(sides))
+    if torque is not None:
+        gradient = gradient + _along(torque, motion.turning(sides))
+    none, no_turn = np.zeros((samples, motion.dimensions)), np.zeros((samples, motion.turn_axes))
+    return Component(joint, label, gradient, none if force is None else force, no_turn if torque is None else torque)
 
 
-class Moving(NamedTuple):
-    """A vector of the free bodies and its derivative: (d,) and (d, unknowns)."""
-
-    value: Array
-    slope: Array
+def _along(vector: Array, slope: Array) -> Array:
+    """Return the part of derivatives (samples or 1, d, unknowns) along a vector (samples, d), (samples, unknowns)."""
+    return np.asarray((vector[:, None] @ slope)[:, 0])
 
 
-def moving(bodies: FreeBodies, vector: Affine, at: Array) -> Moving:
-    """A vector at the coordinates of the free bodies."""
-    found = points([vector], bodies.unknowns)
-    return Moving(found.at(at)[0], found.matrix[0])
+def _resisted(motion: FreeMotion, condition: Any, twists: Mapping[str, Array]) -> Mapping[str, Array]:
+    """Return those torques that do not turn a cable about its own axis, which resists none."""
+    cables = [side for side in (condition.first, condition.second) if motion.is_cable(side.body)] if twists else []
+    if not cables:
+        return twists
+    axes = np.stack(list(twists.values()), axis=1)  # (samples, twists, 3)
+    for side in cables:
+        along = np.einsum("nkd,nd->nk", axes, motion.slope_of(side))
+        _, sizes, right = np.linalg.svd(along[:, None])
+        axes = right[:, int(np.any(sizes > 1e-9)) :] @ axes
+    count = axes.shape[1]
+    return {("mx", "my", "mz")[k] if count == 3 else f"m{k + 1}": axes[:, k] for k in range(count)}
 
 
-def place(bodies: FreeBodies, side: Attachment, at: Array) -> Moving:
-    """The place of an attachment."""
-    return moving(bodies, bodies.placement.point(bodies.scene, side), at)
+def _geared(motion: FreeMotion, joint: str, condition: Geared) -> Component:
+    """Return torques in proportion to the teeth."""
+    gradient = np.zeros((len(motion.at), motion.bodies.unknowns))
+    torques = []
+    for side, axis, factor in zip(condition.sides, condition.axes, condition.factors, strict=True):
+        held = motion.turns["torque"] if motion.turn_axes == 1 else motion.held_axis(side.body, axis)
+        torques.append(factor * held)
+        gradient += _along(torques[-1], motion.turn(side))
+    return Component(joint, "torque", gradient, np.zeros((len(motion.at), motion.dimensions)), torques[0])
 
 
-def gap(bodies: FreeBodies, condition: Any, at: Array) -> Moving:
-    """The way from the first place of a condition to the second."""
-    return moving(bodies, bodies.placement.gap(bodies.scene, condition), at)
+def _coupled(motion: FreeMotion, joint: str, condition: Sum) -> Component:
+    """Return forces along coordinates in proportion to their factors."""
+    axes = ["xyz".index(term.axis) for term in condition.terms]
+    slopes = [motion.slope(motion.placement.point(motion.scene, term.at)) for term in condition.terms]
+    row = sum(term.factor * slope[k] for term, slope, k in zip(condition.terms, slopes, axes, strict=True))
+    force = condition.terms[0].factor * motion.axes[axes[0]]
+    gradient = np.broadcast_to(row, (len(force), motion.bodies.unknowns))
+    return Component(joint, "coupled", gradient, force, np.zeros((len(force), motion.turn_axes)))
 
 
-def of_places(bodies: FreeBodies, name: str, condition: Any, at: Array, torque: Array) -> list[Component]:
-    """Of conditions that know no direction: forces only; torque: none."""
-    if isinstance(condition, Sum):
-        axes = ["xyz".index(term.axis) for term in condition.terms]
-        rows = [place(bodies, term.at, at).slope[axis] for term, axis in zip(condition.terms, axes, strict=True)]
-        gradient = sum(term.factor * row for term, row in zip(condition.terms, rows, strict=True))
-        force = condition.terms[0].factor * np.eye(bodies.scene.dimensions)[axes[0]]
-        return [Component(name, "coupled", np.asarray(gradient), force, torque)]
-    if not isinstance(condition, Meet | Apart):
-        raise unknown(condition)
-    between = gap(bodies, condition, at)
-    if isinstance(condition, Apart):
-        length = np.linalg.norm(between.value)
-        along = between.value / length if length > 0 else np.eye(len(between.value))[0]
-        return [Component(name, "axial", along @ between.slope, along, torque)]
-    return [
-        Component(name, f"f{axis}", slope, unit, torque)
-        for axis, slope, unit in zip("xyz", between.slope, np.eye(len(between.value)), strict=False)
-    ]
+def friction(motion: FreeMotion, held: Mapping[str, Array]) -> dict[str, Component]:
+    """Return the friction of every joint that resists. held: the force [N] of those whose friction depends on it."""
+    found = {}
+    for name, joint in motion.scene.joints.items():
+        if not isinstance(joint, Revolute | Slider) or not joint.resists:
+            continue
+        if isinstance(joint, Slider):
+            along = joint.direction if joint.axis is None else joint.axis
+            unit = _pair(motion, name, "friction", joint, motion.line(joint.first, along), None)
+        else:
+            unit = _pair(motion, name, "friction", joint, None, motion.pin(joint))
+        rate = np.einsum("nu,nu->n", unit.gradient, motion.rate)
+        found[name] = unit.times(-joint.resistance(rate, held.get(name, 0.0)))
+    return found
+
+
+class Displacements(NamedTuple):
+    """Displacements of one free body whose work must vanish: its unknowns, and (samples, displacements, unknowns)."""
+
+    unknowns: list[int]
+    matrix: Array
+
+    def work(self, force: Array) -> Array:
+        """Return the work of generalised forces, (samples, unknowns of all), in each displacement."""
+        return np.einsum("nku,nu->nk", self.matrix, force[:, self.unknowns])
+
+
+def displacements(motion: FreeMotion, lever: float) -> list[Displacements]:
+    """Return the displacements of all free bodies; turns are counted as ways at a lever [m]."""
+    return [_of_body(motion, frame, lever) for frame in motion.placement.frames.values()]
+
+
+def work(moves: list[Displacements], force: Array) -> Array:
+    """Return the work of generalised forces (samples, unknowns) in all displacements, (samples, displacements)."""
+    return np.concatenate([one.work(force) for one in moves], axis=1)
+
+
+def _of_body(motion: FreeMotion, frame: Frame, lever: float) -> Displacements:
+    unknowns = [unknown for vector in frame.vectors for unknown in vector.own or ()]
+    first = {id(vector): motion.dimensions * k for k, vector in enumerate(frame.vectors)}
+    rows: list[Array] = []
+
+    def add(*moves: tuple[Affine, Array]) -> None:
+        row = np.zeros((len(motion.at), len(unknowns)))
+        for vector, value in moves:
+            row[:, first[id(vector)] : first[id(vector)] + motion.dimensions] = value
+        rows.append(row)
+
+    axes = np.eye(motion.dimensions)
+    if isinstance(frame, PointFrame):
+        _translate(add, frame.origin, axes)
+    elif isinstance(frame, BeamFrame):
+        for node in frame.nodes:
+            _translate(add, node[0], axes)
+            if motion.turn_axes == 1 or frame.element.director is None:
+                for k, vector in enumerate(node[1:], 1):
+                    _translate(add, vector, axes * lever ** -float(k))
+            else:
+                values = [(vector, motion.value(vector)) for vector in node[1:]]
+                add((values[0][0], values[0][1] / lever))
+                for axis in axes:
+                    add(*((vector, np.cross(axis, value) / lever) for vector, value in values))
+    elif motion.turn_axes == 1:
+        _translate(add, frame.origin, axes)
+        _turn_in_plane(motion, frame, lever, add)
+    else:
+        _translate(add, frame.origin, axes)
+        for axis in axes:
+            add(*((one, np.cross(axis, motion.value(one)) / lever) for one in frame.directors))
+    return Displacements(unknowns, np.stack(rows, axis=1))
+
+
+def _translate(add: Any, vector: Affine, axes: Array) -> None:
+    for axis in axes:
+        add((vector, axis))
+
+
+def _turn_in_plane(motion: FreeMotion, frame: Any, lever: float, add: Any) -> None:
+    """Add the turn of a rigid or modal body, and the bending and stretching of the latter."""
+    modes = frame.amplitudes if isinstance(frame, ModalFrame) else ()
+    quarter = plane.QUARTER.T
+    add(*((one, motion.value(one) @ quarter / lever) for one in (frame.directors[0], *modes)))
+    e = motion.value(frame.directors[0]) / lever
+    for vector in modes:
+        add((vector, e))
+    stretching = frame.modes.along if isinstance(frame, ModalFrame) else 0
+    if stretching:
+        add((frame.directors[0], e))
+    for vector in modes[: max(stretching - 1, 0)]:
+        add((vector, e @ quarter))

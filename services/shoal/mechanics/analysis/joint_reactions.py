@@ -9,18 +9,17 @@ the joints whose forces are not unique are named.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from shoal.error_budget import ErrorBudget
 from shoal.errors import InputError
-from shoal.mechanics import joints, plane
-from shoal.mechanics.analysis import plane_forces, space_forces
 from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.analysis.free_bodies import FreeBodies
+from shoal.mechanics.analysis.free_motion import FreeMotion
 from shoal.mechanics.analysis.freedom import Metric
-from shoal.mechanics.analysis.joint_forces import Component, friction, place
+from shoal.mechanics.analysis.joint_forces import Component, components, displacements, friction, work
 from shoal.mechanics.analysis.singular import SHARE, beside
 from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import Array
@@ -115,6 +114,87 @@ def told(found: list[Reactions]) -> dict[str, Any]:
     return {"status": worst.status, "message": message, "reactions": [one.to_json() for one in found]}
 
 
+class Exerted(NamedTuple):
+    """Forces of all joints along a motion.
+
+    parts: the unknowns; sizes: of each [N or N m], (samples, parts); free_play: how much of each could be different
+    with the same motion, 0 to 1, (samples, parts); friction: of the joints that resist. redundancy: of self-stresses;
+    unbalanced: what no joint can balance [N]; scale: size of all forces [N]; (samples,) each. none: no force and no
+    torque, (samples, ...)
+    """
+
+    parts: list[Component]
+    sizes: Array
+    free_play: Array
+    friction: dict[str, Component]
+    redundancy: Array
+    unbalanced: Array
+    scale: Array
+    none: tuple[Array, Array]
+
+    def of(self, joint: str) -> tuple[Array, Array]:
+        """Return force [N] and torque [N m] of a joint on its second body, friction included, (samples, ...)."""
+        acting = [part.times(self.sizes[:, k]) for k, part in enumerate(self.parts) if part.joint == joint]
+        acting += [self.friction[joint]] if joint in self.friction else []
+        force, torque = self.none
+        return sum((one.force for one in acting), force), sum((one.torque for one in acting), torque)
+
+    def shares(self, joint: str) -> Array:
+        """Return how much of the forces of a joint could be different, (samples,)."""
+        mine = [k for k, part in enumerate(self.parts) if part.joint == joint]
+        return np.asarray(np.max(self.free_play[:, mine], axis=1, initial=0.0))
+
+
+def exerted(motion: FreeMotion, change: Array, force: Array, elastic: Array) -> Exerted:
+    """Return what joints exert where the bodies accelerate by `change` under `force`, of which `elastic` is elastic.
+
+    Each (samples, unknowns) of the free bodies.
+    """
+    at, lever = motion.at, float(np.ravel(span(motion.scene))[0])
+    inertia = (motion.bodies.mass @ change.T).T
+    parts, moves = components(motion), displacements(motion, lever)
+    count = len(parts)
+    units = np.array([lever if part.turns else 1.0 for part in parts])
+    columns = (
+        np.stack([unit * work(moves, part.gradient) for unit, part in zip(units, parts, strict=True)], axis=-1)
+        if count
+        else np.zeros((len(change), work(moves, inertia).shape[1], 0))
+    )
+    left, singular, right = np.linalg.svd(columns, full_matrices=False)
+    kept = singular > RANK * singular[:, :1]
+    inverse = np.where(kept, 1.0 / np.where(kept, singular, 1.0), 0.0)
+    held: dict[str, Array] = {}
+    for _ in range(ROUNDS):
+        rubbed = friction(motion, held)
+        known = sum((part.gradient for part in rubbed.values()), np.zeros_like(force))
+        missing = work(moves, inertia - force - known)
+        told = np.einsum("nrk,nr->nk", right, inverse * np.einsum("nwr,nw->nr", left, missing))
+        last, held = held, _pressed(motion.scene, parts, told)
+        if all(np.all(np.abs(now - last.get(name, 0.0)) <= SETTLED * now) for name, now in held.items()):
+            break
+    acting = (inertia, force, known, force - elastic)
+    return Exerted(
+        parts,
+        told * units,
+        np.sqrt(np.maximum(0.0, 1.0 - np.sum(np.where(kept[..., None], right, 0.0) ** 2, axis=1))),
+        rubbed,
+        count - kept.sum(axis=1),
+        np.linalg.norm(missing - np.einsum("nwk,nk->nw", columns, told), axis=1),
+        np.max([np.linalg.norm(work(moves, one), axis=1) for one in acting], axis=0),
+        (np.zeros((len(at), motion.dimensions)), np.zeros((len(at), motion.turn_axes))),
+    )
+
+
+def _pressed(scene: Scene, parts: list[Component], sizes: Array) -> dict[str, Array]:
+    """Return the force [N] of each joint whose friction depends on it, (samples,)."""
+    found = {}
+    for name, joint in scene.joints.items():
+        if isinstance(joint, Revolute | Slider) and joint.share:
+            mine = [part.times(sizes[:, k]) for k, part in enumerate(parts) if part.joint == name and not part.turns]
+            found[name] = np.linalg.norm(sum(one.force for one in mine), axis=1)
+    return found
+
+
 def reactions_of(
     evaluator: Evaluator,
     q: Array,
@@ -123,74 +203,31 @@ def reactions_of(
     t: float = 0.0,
     *,
     bodies: FreeBodies | None = None,
-    naming: bool = True,
 ) -> Reactions:
-    """Reactions at one state: coordinates, rates and accelerations, each (unknowns,).
-
-    naming: whether the constraints that depend on others are named, which takes most of the time
-    """
+    """Return the reactions at one state: coordinates, rates and accelerations, each (unknowns,)."""
     bodies = bodies or FreeBodies(evaluator, t)
     rubbing = evaluator.model.forces.size - bodies.evaluator.model.forces.size
     bodies.evaluator.turns = evaluator.turns[rubbing:]
     at, rate, change = bodies.state(q, v, a)
-    free = bodies.evaluator
-    lever = span(bodies.scene)
-    here: Any = plane_forces if bodies.scene.dimensions == plane.DIMENSIONS else space_forces
-    told = joints.of_scene(bodies.scene)
-    unknown = [part for name, one in told for part in here.components(bodies, name, one, at)]
-    force = free.at(at, rate, t).force
-    inertia = bodies.mass @ change
-    displacements = here.displacements(bodies, at, lever)
-    count = len(unknown)
-    columns = np.zeros((len(displacements), count))
-    for k, part in enumerate(unknown):
-        columns[:, k] = displacements @ part.gradient * (lever if part.turns else 1.0)
-    left, sizes, right = np.linalg.svd(columns, full_matrices=True)
-    rank = int(np.sum(sizes > RANK * sizes[0])) if count and len(sizes) else 0
-    held: dict[str, float] = {}
-    for _ in range(ROUNDS):
-        known, rubbed = friction(bodies, at, rate, here.rubbing, held)
-        missing = displacements @ (inertia - force - known)
-        solution = right[:rank].T @ ((left[:, :rank].T @ missing) / sizes[:rank])
-        last, held = held, _pressed(bodies.scene, unknown, solution)
-        if all(abs(size - last.get(name, 0.0)) <= SETTLED * size for name, size in held.items()):
-            break
-    scale = max(
-        float(np.linalg.norm(displacements @ part)) for part in (inertia, force, known, force - free.at(at).elastic)
-    )
-    rest = float(np.linalg.norm(missing - columns @ solution))
-    free_play = np.linalg.norm(right[rank:], axis=0) if rank < count else np.zeros(count)
+    motion = FreeMotion(bodies, at[None], rate[None])
+    here = bodies.evaluator.at(at, rate, t)
+    told = exerted(motion, change[None], here.force[None], bodies.evaluator.at(at).elastic[None])
     found = {}
-    for name in bodies.scene.joints:
-        mine = [k for k, part in enumerate(unknown) if part.joint == name]
-        values = {k: float(solution[k]) * (lever if unknown[k].turns else 1.0) for k in mine}
-        none = np.zeros(bodies.scene.dimensions), np.zeros(1 if here is plane_forces else 3)
-        rubbing_force, rubbing_torque = rubbed.get(name, none)
-        total = sum((unknown[k].force * values[k] for k in mine), rubbing_force)
-        torque = sum((unknown[k].torque * values[k] for k in mine), rubbing_torque).tolist()
-        joint = bodies.scene.joints[name]
+    for name, joint in bodies.scene.joints.items():
+        force, torque = (one[0].tolist() for one in told.of(name))
         found[name] = JointReaction(
             name,
             joint.kind,
-            tuple(place(bodies, _second(joint), at).value.tolist()),
-            tuple(total.tolist()),
-            torque[0] if here is plane_forces else tuple(torque),
-            {unknown[k].name: values[k] for k in mine},
-            bool(np.all(free_play[mine] < SHARE)),
+            tuple(motion.place(_second(joint))[0].tolist()),
+            tuple(force),
+            torque[0] if len(torque) == 1 else tuple(torque),
+            {part.name: float(told.sizes[0, k]) for k, part in enumerate(told.parts) if part.joint == name},
+            bool(told.shares(name)[0] < SHARE),
         )
+    scale, redundancy = float(told.scale[0]), int(told.redundancy[0])
     # Without a self-stress only rows of the model depend on each other, as both parts of a driven angle on a director.
-    names = redundant_constraints(evaluator, q, t) if naming and count > rank else ()
-    return Reactions(t, found, count - rank, names, rest / scale if scale > 0 else 0.0, scale)
-
-
-def _pressed(scene: Scene, unknown: list[Component], solution: Array) -> dict[str, float]:
-    """The force [N] of each joint whose friction depends on it."""
-    found = {}
-    for name, joint in scene.joints.items():
-        if isinstance(joint, Revolute | Slider) and joint.share:
-            mine = [solution[k] * part.force for k, part in enumerate(unknown) if part.joint == name and not part.turns]
-            found[name] = float(np.linalg.norm(sum(mine)))
-    return found
+    names = redundant_constraints(evaluator, q, t) if redundancy else ()
+    return Reactions(t, found, redundancy, names, float(told.unbalanced[0]) / scale if scale > 0 else 0.0, scale)
 
 
 def require_unique_friction(model: Model) -> None:

@@ -1,43 +1,70 @@
-"""What the joints of a machine exert along its motion."""
+"""Forces and torques of joints along a motion, as load cells in the joints would measure them."""
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from shoal.mechanics import plane
-from shoal.mechanics.analysis import load_cells
+from shoal.errors import InputError
 from shoal.mechanics.analysis.felt import Felt
 from shoal.mechanics.analysis.free_bodies import FreeBodies
-from shoal.mechanics.analysis.joint_reactions import JointReaction, reactions_of
-from shoal.mechanics.analysis.load_cells import Balance, Reaction
-from shoal.mechanics.analysis.load_cells_in_space import SpatialBalance
+from shoal.mechanics.analysis.free_motion import FreeMotion
+from shoal.mechanics.analysis.joint_reactions import exerted
+from shoal.mechanics.analysis.singular import SHARE
+from shoal.mechanics.numerics.tile import Array
 from shoal.scene.joints import DrivenAngle
+
+BLOCK = 64
+"""Samples that are balanced at once, which bounds the memory."""
+
+
+class Reaction(NamedTuple):
+    """What a joint exerts on its second body, friction included, at every sample.
+
+    force [N], (samples, d); torque [N m], (samples,), in space a vector, (samples, 3); drive: in space that of a drive
+    about its axis, (samples,)
+    """
+
+    force: Array
+    torque: Array
+    drive: Array | None = None
 
 
 def reactions_along(felt: Felt, names: tuple[str, ...]) -> dict[str, Reaction]:
-    """What some joints exert; the model has one lane. Raises InputError if the machine cannot tell them apart.
+    """Return what some joints exert; the model has one lane.
 
-    In space the torque is a vector, (samples, 3).
+    Raises InputError if the forces of one of them are not unique at most of the samples.
     """
-    model = felt.evaluator.model
-    if not model.flexible and not model.modal:
-        kind = Balance if model.dimensions == plane.DIMENSIONS else SpatialBalance
-        return load_cells.reactions_along(felt, names, kind)
     bodies = FreeBodies(felt.evaluator, float(felt.times[-1]))
-    found: dict[str, list[JointReaction]] = {name: [] for name in names}
-    for q, v, a, turns, t in zip(felt.q, felt.v, felt.a, felt.turns, felt.times.tolist(), strict=True):
-        felt.evaluator.turns = turns
-        told = reactions_of(felt.evaluator, q, v, a, t, bodies=bodies, naming=False)
-        for name in names:
-            if not told.joints[name].unique:
-                raise load_cells.not_unique(felt.scene.name, name)
-            found[name].append(told.joints[name])
-    return {name: _reaction(felt, each) for name, each in found.items()}
+    rubbing = felt.evaluator.model.forces.size - bodies.evaluator.model.forces.size
+    at, rate, change = bodies.state(felt.q, felt.v, felt.a)
+    force = np.empty_like(at)
+    for k, (q, v, t) in enumerate(zip(at, rate, felt.times, strict=True)):
+        bodies.evaluator.turns = felt.turns[k, rubbing:]
+        force[k] = bodies.evaluator.force(q, v, float(t))
+    parts = []
+    for first in range(0, len(at), BLOCK):
+        block = slice(first, first + BLOCK)
+        motion = FreeMotion(bodies, at[block], rate[block])
+        parts.append(exerted(motion, change[block], force[block], np.zeros_like(force[block])))
+    found = {}
+    for name in names:
+        shares = np.concatenate([part.shares(name) for part in parts])
+        if np.median(shares) > SHARE:
+            raise _not_unique(felt.scene.name, name)
+        pairs = [part.of(name) for part in parts]
+        push, torque = (np.concatenate([pair[k] for pair in pairs]) for k in (0, 1))
+        drive = None
+        if torque.shape[1] > 1 and isinstance(felt.scene.joints[name], DrivenAngle):
+            own = next(k for k, part in enumerate(parts[0].parts) if part.joint == name)
+            drive = np.concatenate([part.sizes[:, own] for part in parts])
+        found[name] = Reaction(push, torque[:, 0] if torque.shape[1] == 1 else torque, drive)
+    return found
 
 
-def _reaction(felt: Felt, each: list[JointReaction]) -> Reaction:
-    """The reaction of a joint at all samples."""
-    force, torque = np.array([one.force for one in each]), np.array([one.torque for one in each])
-    if not isinstance(felt.scene.joints[each[0].joint], DrivenAngle) or torque.ndim == 1:
-        return Reaction(force, torque)
-    return Reaction(force, torque, np.array([next(iter(one.components.values())) for one in each]))
+def _not_unique(scene: str, joint: str) -> InputError:
+    return InputError(
+        f"channels: the forces of joint {joint} are not unique: {scene} holds itself more than it needs to; "
+        "measure another joint, or leave out what is redundant"
+    )
