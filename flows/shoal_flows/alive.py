@@ -95,7 +95,7 @@ def of_worker(worker: str) -> list[Mark]:
 
 
 def is_held(kind: str, run_id: str) -> bool:
-    """Whether a process of this home runs a run."""
+    """Return whether a process of this home runs a run."""
     with suppress(FileNotFoundError), (_folder() / f"{kind}-{run_id}").open("r+") as file:
         return not _locked(file)
     return False
@@ -117,7 +117,7 @@ def _marks() -> list[Path]:
 
 
 def _locked(file: IO[str]) -> bool:
-    """Whether nobody else had the lock; it is ours until the file is closed."""
+    """Return whether nobody else had the lock; it is ours until the file is closed."""
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError:

@@ -39,7 +39,7 @@ class Exports:
 
     @property
     def ok(self) -> bool:
-        """Whether the motion, if there is one, may be believed."""
+        """Return whether the motion, if there is one, may be believed."""
         return self.motion is None or self.motion.ok
 
     @property

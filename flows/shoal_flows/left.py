@@ -70,7 +70,7 @@ class Unstarted:
 
 
 def _end(mark: Mark) -> bool:
-    """Whether there is nothing left to do for this run."""
+    """Return whether there is nothing left to do for this run."""
     from httpx import HTTPError
 
     try:

@@ -38,7 +38,7 @@ class Repeated:
 
     @property
     def agree(self) -> bool:
-        """Whether there are figures and all of them agree."""
+        """Return whether there are figures and all of them agree."""
         return bool(self.figures) and not self.different
 
     @property

@@ -32,7 +32,7 @@ class Study:
 
     @property
     def trusted(self) -> bool:
-        """Whether every optimisation ended with an answer that can be used."""
+        """Return whether every optimisation ended with an answer that can be used."""
         return bool(self.fits) and not self.failures and all(f.estimate.verdict.trusted for f in self.fits)
 
     def doubts(self) -> list[str]:
@@ -60,7 +60,7 @@ class Answer(Protocol):
 
     @property
     def ok(self) -> bool:
-        """Whether it may be believed."""
+        """Return whether it may be believed."""
         ...
 
     def to_json(self) -> dict[str, Any]:
@@ -80,7 +80,7 @@ class Logged(Generic[A]):
 
     @property
     def trusted(self) -> bool:
-        """Whether it may be believed."""
+        """Return whether it may be believed."""
         return self.answer.ok
 
     def doubts(self) -> list[str]:
@@ -119,7 +119,7 @@ class Simulated:
 
     @property
     def trusted(self) -> bool:
-        """Whether the motion may be believed."""
+        """Return whether the motion may be believed."""
         return self.motion.ok
 
     def doubts(self) -> list[str]:
@@ -145,7 +145,7 @@ class Selected:
 
     @property
     def trusted(self) -> bool:
-        """Whether it meets the tolerance."""
+        """Return whether it meets the tolerance."""
         return self.selection.met and self.selection.trajectory.ok
 
     def doubts(self) -> list[str]:
@@ -178,7 +178,9 @@ class DemoResult:
 
     @property
     def trusted(self) -> bool:
-        """Whether least squares and the repaired swarm found trusted answers and the engines agree on the tip."""
+        """Return whether least squares and the repaired swarm found trusted answers and the engines agree on the
+        tip.
+        """
         return not self.doubts()
 
     def doubts(self) -> list[str]:

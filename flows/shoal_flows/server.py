@@ -52,7 +52,7 @@ def wait() -> None:
 
 
 def answers() -> bool:
-    """Whether there is a server at PREFECT_API_URL."""
+    """Return whether there is a server at PREFECT_API_URL."""
     return _answers(os.environ["PREFECT_API_URL"])
 
 
@@ -145,7 +145,7 @@ class _Kept:
         return False
 
     def _does_answer(self) -> bool:
-        """Whether it answers, as soon as it does; not if it ends before that."""
+        """Return whether it answers, as soon as it does; not if it ends before that."""
         deadline = time.monotonic() + _PATIENCE
         while self._process.poll() is None and time.monotonic() < deadline:
             if _answers(self.address):

@@ -42,7 +42,7 @@ class Limit:
         return {name: bound for name, bound in asdict(self).items() if name in _WORDS and bound is not None}
 
     def holds(self, value: Any) -> bool:
-        """Whether a value is such a number; true, false, texts and arrays are none."""
+        """Return whether a value is such a number; true, false, texts and arrays are none."""
         if not isinstance(value, Integral if self.whole else Real) or isinstance(value, bool):
             return False
         return math.isfinite(value) and all(_HOLDS[name](value, bound) for name, bound in self.bounds.items())

@@ -187,7 +187,7 @@ def _scene(given: notebook.Stated) -> Any:
 
 
 def _is_name(given: Any) -> bool:
-    """Whether it is that of something the service knows."""
+    """Return whether it is that of something the service knows."""
     return isinstance(given, str) and Path(given).suffix not in YAML
 
 

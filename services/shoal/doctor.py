@@ -119,7 +119,7 @@ def check_engine(name: str, close: float = CLOSE) -> Check:
 
 
 def check_package(name: str, extra: str) -> Check:
-    """Whether a package is there, and which extra brings it."""
+    """Return whether a package is there, and which extra brings it."""
     try:
         return Check(name, True, version(name))
     except PackageNotFoundError:
@@ -127,7 +127,7 @@ def check_package(name: str, extra: str) -> Check:
 
 
 def check_server(name: str, variable: str, otherwise: str) -> Check:
-    """Whether a server that the user has named answers."""
+    """Return whether a server that the user has named answers."""
     address = os.environ.get(variable, "")
     what = f"{name} server"
     if not address.startswith(("http://", "https://")):
@@ -138,7 +138,7 @@ def check_server(name: str, variable: str, otherwise: str) -> Check:
 
 
 def check_runs(address: str | None, patience: float = PATIENCE) -> list[Check]:
-    """Whether MLflow's database can be read, where runs go to one of SQLite that is there.
+    """Return whether MLflow's database can be read, where runs go to one of SQLite that is there.
 
     address: of MLflow, None for the database of the state folder; patience: seconds that another program may hold it
     """
@@ -160,7 +160,7 @@ def check_runs(address: str | None, patience: float = PATIENCE) -> list[Check]:
 
 
 def check_nights(address: str) -> Check:
-    """Whether the Prefect server there has the next night in its calendar: a schedule alone makes no run."""
+    """Return whether the Prefect server there has the next night in its calendar: a schedule alone makes no run."""
     what, api = "nights", address.rstrip("/")
     if not _answers(f"{api}/health"):
         return Check(what, True, f"no Prefect server at {api}; none are scheduled")

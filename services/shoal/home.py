@@ -62,7 +62,7 @@ _WORTH_KEEPING = {"library": "a library", "mlflow.db": "runs"}
 
 
 def _holds(path: Path) -> bool:
-    """Whether there is a file, or a folder that is not empty."""
+    """Return whether there is a file, or a folder that is not empty."""
     try:
         return path.is_file() or any(path.iterdir())
     except OSError:
@@ -102,7 +102,7 @@ def kernel_cache(package: Path = _PACKAGE) -> Path:
 
 
 def compiled() -> bool:
-    """Whether there are compiled kernels; without, the first run takes a minute."""
+    """Return whether there are compiled kernels; without, the first run takes a minute."""
     return any(Path(os.environ.get("NUMBA_CACHE_DIR") or kernel_cache()).rglob("*.nbi"))
 
 

@@ -235,7 +235,7 @@ def _below(folder: PurePosixPath, files: Documents) -> Documents:
 
 
 def _fits(more: Documents, files: Documents) -> bool:
-    """Whether files can be kept beside others under the paths that they have."""
+    """Return whether files can be kept beside others under the paths that they have."""
     try:
         check_paths([*more, *files])
     except InputError:
@@ -253,7 +253,7 @@ def _check(kind: Kind, document: Path) -> None:
 
 
 def _check_paths(kind: Kind, document: Path) -> None:
-    """Whether a document names nothing but what is below it, and entries of the library. Raises InputError."""
+    """Return whether a document names nothing but what is below it, and entries of the library. Raises InputError."""
     size = document.stat().st_size
     if size > LARGEST:
         raise InputError(f"{document.name}: larger than the {LARGEST} bytes that are read")

@@ -140,11 +140,11 @@ class Shelf:
         return place / f"{name}.yaml"
 
     def is_held(self, document: Path) -> bool:
-        """Whether `hold` made this path."""
+        """Return whether `hold` made this path."""
         return document.parent.parent == self.root / _HELD and document.is_file()
 
     def _inside(self, path: Path) -> bool:
-        """Whether no link below the library leads elsewhere."""
+        """Return whether no link below the library leads elsewhere."""
         try:
             return path.resolve() == self.root.resolve() / path.relative_to(self.root)
         except OSError:
@@ -251,7 +251,7 @@ def check_name(name: str) -> str:
 
 
 def check_files(name: str, files: Files) -> None:
-    """Whether files can be kept as an entry. Raises InputError."""
+    """Return whether files can be kept as an entry. Raises InputError."""
     if f"{name}.yaml" not in files:
         raise InputError(f"{name}: files: {name}.yaml is missing; there are {', '.join(sorted(files)[:5]) or 'none'}")
     try:
@@ -265,7 +265,7 @@ def check_files(name: str, files: Files) -> None:
 
 
 def check_paths(files: Iterable[str]) -> None:
-    """Whether these can be the paths of an entry's files. Raises InputError."""
+    """Return whether these can be the paths of an entry's files. Raises InputError."""
     paths = set(files)
     if len(paths) > _MOST:
         raise InputError(f"files: an entry has at most {_MOST}, found {len(paths)}")

@@ -254,7 +254,7 @@ def _separator(line: str) -> str:
 
 
 def _has_decimal_commas(data: bytes) -> bool:
-    """Whether numbers have commas and none has a point: beside points, commas part thousands."""
+    """Return whether numbers have commas and none has a point: beside points, commas part thousands."""
     return bool(re.search(rb"\d,\d", data)) and not re.search(rb"\d\.\d", data)
 
 
@@ -273,7 +273,7 @@ def _tabbed(data: bytes) -> bytes:
 
 
 def _are_numbers(cells: Sequence[str]) -> bool:
-    """Whether cells, with either decimal mark, are numbers or gaps, and not all gaps."""
+    """Return whether cells, with either decimal mark, are numbers or gaps, and not all gaps."""
     filled = [cell for cell in cells if cell.strip().lower() not in _EMPTY]
     return bool(filled) and all(np.isfinite([_float(cell, "," if "," in cell else ".") for cell in filled]))
 

@@ -62,7 +62,9 @@ class Units:
 
 
 def is_unit_line(cells: Sequence[str]) -> bool:
-    """Whether cells are a line of units: none is a number, and a known unit or a word in brackets is among them."""
+    """Return whether cells are a line of units: none is a number, and a known unit or a word in brackets is among
+    them.
+    """
     words = [cell.strip() for cell in cells]
     return not any(_is_number(word) for word in words) and any(
         _known(word) or (_BRACKETED.fullmatch(word) and len(word) > 2) for word in words

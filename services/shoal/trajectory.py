@@ -89,7 +89,7 @@ class Trajectory:
 
     @property
     def ok(self) -> bool:
-        """Whether every lane may be believed."""
+        """Return whether every lane may be believed."""
         return all(status is Status.OK for status in self.status)
 
     @property

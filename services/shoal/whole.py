@@ -49,7 +49,7 @@ def whole(path: Path) -> Iterator[Path]:
 
 
 def _stream(path: Path) -> bool:
-    """Whether that is neither a file nor a folder. Raises OSError for what can be none of them."""
+    """Return whether that is neither a file nor a folder. Raises OSError for what can be none of them."""
     try:
         mode = path.stat().st_mode
     except FileNotFoundError:

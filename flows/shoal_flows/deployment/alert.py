@@ -28,7 +28,7 @@ class Receiver:
 
     @property
     def hooked(self) -> bool:
-        """Whether it is asked by POST, without Apprise."""
+        """Return whether it is asked by POST, without Apprise."""
         return self.url.startswith(("http://", "https://"))
 
 

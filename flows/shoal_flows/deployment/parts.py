@@ -43,11 +43,11 @@ class Part(Protocol):
         ...
 
     def is_ready(self) -> bool:
-        """Whether it can do its work."""
+        """Return whether it can do its work."""
         ...
 
     def ended(self) -> bool:
-        """Whether it is gone."""
+        """Return whether it is gone."""
         ...
 
 
@@ -76,7 +76,7 @@ class Line:
         )
 
     def is_ready(self) -> bool:
-        """Whether it can do its work."""
+        """Return whether it can do its work."""
         return processes.is_ready(self.name)
 
     def ready(self) -> None:
@@ -88,7 +88,7 @@ class Line:
             time.sleep(0.2)
 
     def ended(self) -> bool:
-        """Whether it is gone."""
+        """Return whether it is gone."""
         return self._process is None or self._process.poll() is not None
 
     def stop(self) -> None:

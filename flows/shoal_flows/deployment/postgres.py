@@ -47,11 +47,11 @@ class Postgres:
         _make_databases(self._port, self._password)
 
     def is_ready(self) -> bool:
-        """Whether it can do its work: `begin` waits for that."""
+        """Return whether it can do its work: `begin` waits for that."""
         return not self.ended()
 
     def ended(self) -> bool:
-        """Whether its first process is gone."""
+        """Return whether its first process is gone."""
         with suppress(OSError, ValueError, IndexError):
             os.kill(int((self._data / "postmaster.pid").read_text().split()[0]), 0)
             return False

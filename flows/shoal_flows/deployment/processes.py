@@ -66,7 +66,7 @@ def check_port(name: str) -> None:
 
 
 def is_ready(name: str) -> bool:
-    """Whether a process answers that it can do its work."""
+    """Return whether a process answers that it can do its work."""
     try:
         with urlopen(f"http://127.0.0.1:{port(name)}{_READY[name][1]}", timeout=5) as answer:
             return bool(answer.status == 200)

@@ -29,7 +29,7 @@ class Validated:
 
     @property
     def trusted(self) -> bool:
-        """Whether every line is as it should be."""
+        """Return whether every line is as it should be."""
         return self.night.passed
 
     def doubts(self) -> list[str]:

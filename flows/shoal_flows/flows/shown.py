@@ -26,7 +26,7 @@ class Result(Protocol):
 
     @property
     def trusted(self) -> bool:
-        """Whether it can be used."""
+        """Return whether it can be used."""
         ...
 
     @property

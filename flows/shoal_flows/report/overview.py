@@ -52,7 +52,7 @@ class Study:
 
     @property
     def trusted(self) -> bool:
-        """Whether its answer can be used."""
+        """Return whether its answer can be used."""
         return self.verdict.startswith(_TRUSTED)
 
 
@@ -69,7 +69,7 @@ class Drift:
 
     @property
     def real(self) -> bool:
-        """Whether the interval of the slope leaves out zero."""
+        """Return whether the interval of the slope leaves out zero."""
         return abs(self.per_week) > self.either
 
     def at(self, when: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:

@@ -21,7 +21,7 @@ def errors(fit: Fit) -> dict[str, float]:
 
 
 def covered(fit: Fit) -> bool:
-    """Whether every interval contains the truth."""
+    """Return whether every interval contains the truth."""
     values = fit.estimate.parameters
     return all(values[name].lower <= true <= values[name].upper for name, true in fit.estimate.truth.items())
 

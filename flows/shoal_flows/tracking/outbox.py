@@ -64,7 +64,7 @@ def _upload(where: Path, make: Callable[[Run], None], send: Callable[[Run], None
 
 @contextmanager
 def _alone() -> Iterator[bool]:
-    """Whether no other process uploads within the block."""
+    """Return whether no other process uploads within the block."""
     with (folder() / ".lock").open("w") as lock:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)

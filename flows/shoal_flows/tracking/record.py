@@ -67,7 +67,7 @@ class Run:
 
     @property
     def known(self) -> bool:
-        """Whether MLflow has made this run."""
+        """Return whether MLflow has made this run."""
         return not self.run_id.startswith(LOCAL)
 
     def describe(self, text: str) -> None:

@@ -129,7 +129,9 @@ def found_run(client: Any, run_id: str) -> Any:
 
 
 def _attempt(what: Callable[[Run], None], run: Run) -> bool:
-    """Whether MLflow took it; one that does not answer is not asked again for a while, as every try takes seconds."""
+    """Return whether MLflow took it; one that does not answer is not asked again for a while, as every try takes
+    seconds.
+    """
     if _is_silent():
         return False
     try:
@@ -151,7 +153,7 @@ def _deliver(run: Run) -> None:
 
 
 def _waits(run: Run) -> bool:
-    """Whether it is part of a study that MLflow does not know yet."""
+    """Return whether it is part of a study that MLflow does not know yet."""
     return run.parent is not None and run.parent.startswith(LOCAL)
 
 

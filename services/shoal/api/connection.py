@@ -114,7 +114,7 @@ class BoundedProtocol(H11Protocol):
 
     @property
     def computing(self) -> bool:
-        """Whether the peer waits for the server: a request is complete and its answer is not."""
+        """Return whether the peer waits for the server: a request is complete and its answer is not."""
         cycle = cast("RequestResponseCycle | None", self.cycle)
         return cycle is not None and not cycle.response_complete and not self._sending_body()
 

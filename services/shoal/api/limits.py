@@ -22,7 +22,7 @@ class TooMuch(InputError):  # noqa: N818 - a refusal, not a failure
 
 
 def check_scene(scene: Scene, settings: Settings, times: Sequence[float] | None = None, lanes: int = 1) -> None:
-    """Whether a scene may be simulated in so many lanes. times [s]: of the samples. Raises TooMuch."""
+    """Return whether a scene may be simulated in so many lanes. times [s]: of the samples. Raises TooMuch."""
     solver = scene.solver
     elements = _elements(scene)
     if elements > settings.max_elements:
@@ -51,7 +51,7 @@ def within(scene: Scene, settings: Settings, lanes: int = 1) -> Scene:
 
 
 def check_end(motion: Trajectory, scene: Scene) -> None:
-    """Whether a motion came to its end in the steps that `within` left it. Raises TooMuch."""
+    """Return whether a motion came to its end in the steps that `within` left it. Raises TooMuch."""
     reached = motion.steps < scene.solver.max_steps or not _adaptive(scene, motion.model.get("integrator"))
     if not (motion.ok or reached):
         raise TooMuch(
@@ -65,7 +65,9 @@ def _elements(scene: Scene) -> int:
 
 
 def _adaptive(scene: Scene, integrator: str | None = None) -> bool:
-    """Whether an integrator, else the one that a scene names, chooses its steps; of `auto` only the model tells."""
+    """Return whether an integrator, else the one that a scene names, chooses its steps; of `auto` only the model
+    tells.
+    """
     name = integrator or scene.solver.integrator
     return name in INTEGRATORS and facts(name).adaptive
 
@@ -73,7 +75,7 @@ def _adaptive(scene: Scene, integrator: str | None = None) -> bool:
 def check_lanes(
     scene: Scene, settings: Settings, times: Sequence[float] | None, lanes: Mapping[str, Sequence[float]]
 ) -> None:
-    """Whether a scene may be simulated with these numbers, one per lane. Raises InputError."""
+    """Return whether a scene may be simulated with these numbers, one per lane. Raises InputError."""
     if not lanes or not all(lanes.values()):
         raise InputError("lanes: needs at least one path, and one number or more for each")
     count = max(len(column) for column in lanes.values())
@@ -87,7 +89,7 @@ def check_lanes(
 def check_grid(
     scene: Scene, settings: Settings, times: Sequence[float] | None, axes: Mapping[str, Sequence[float]]
 ) -> None:
-    """Whether a scene may be simulated over the full grid of these values. Raises InputError."""
+    """Return whether a scene may be simulated over the full grid of these values. Raises InputError."""
     count = math.prod(len(axis) for axis in axes.values())
     check_scene(scene, settings, times, count)
     for path, axis in axes.items():
@@ -99,5 +101,5 @@ def check_grid(
 
 
 def _costly(path: str) -> bool:
-    """Whether the work depends on it, which then may differ from lane to lane."""
+    """Return whether the work depends on it, which then may differ from lane to lane."""
     return path.startswith("solver.") or path.endswith((".elements", ".modes", ".axial_modes"))

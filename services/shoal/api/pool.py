@@ -48,7 +48,7 @@ class Pool:
 
     @property
     def ready(self) -> bool:
-        """Whether a worker is up and warm."""
+        """Return whether a worker is up and warm."""
         return any(worker.up for worker in self._workers)
 
     def start(self) -> None:

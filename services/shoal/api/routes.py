@@ -68,13 +68,13 @@ EntryName = Annotated[str, Path(max_length=100)]
 
 @health.get("/health")
 async def live() -> Health:
-    """Whether the program lives."""
+    """Return whether the program lives."""
     return Health(status="ok")
 
 
 @health.get("/ready", responses=documented("not-ready"))
 async def ready(request: Request) -> Health:
-    """Whether workers are up, with warm kernels."""
+    """Return whether workers are up, with warm kernels."""
     if not (request.app.state.calls.ready and request.app.state.job_pool.ready):
         raise Refusal("not-ready", "workers are starting", headers={"Retry-After": "5"})
     return Health(status="ok")

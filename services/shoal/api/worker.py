@@ -44,7 +44,7 @@ class Worker:
 
     @property
     def up(self) -> bool:
-        """Whether the process is there, with warm kernels."""
+        """Return whether the process is there, with warm kernels."""
         return bool(self.about) and self._process is not None and self._process.is_alive()
 
     def start(self) -> None:

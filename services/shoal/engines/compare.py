@@ -43,7 +43,7 @@ class Comparison:
 
     @property
     def ok(self) -> bool:
-        """Whether at least two engines ran and every run may be believed."""
+        """Return whether at least two engines ran and every run may be believed."""
         return len(self.trajectories) >= 2 and not self.refused and all(t.ok for t in self.trajectories.values())
 
     @property

@@ -163,7 +163,7 @@ def _address(url: str) -> httpx.URL:
 
 
 def loopback(host: str) -> bool:
-    """Whether a host's name or address is that of this machine only."""
+    """Return whether a host's name or address is that of this machine only."""
     try:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:

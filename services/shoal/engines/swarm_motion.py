@@ -64,7 +64,7 @@ class Search:
 
 
 def asked_for(scene: Scene) -> bool:
-    """Whether `solver.acceleration` names a swarm."""
+    """Return whether `solver.acceleration` names a swarm."""
     return scene.solver.acceleration in OPTIMIZERS
 
 

@@ -73,7 +73,7 @@ class Sweep:
 
     @property
     def ok(self) -> bool:
-        """Whether every point may be believed."""
+        """Return whether every point may be believed."""
         return not self.complaint
 
     @property

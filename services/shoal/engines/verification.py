@@ -373,7 +373,7 @@ def _adaptive(trajectory: Trajectory) -> bool:
 
 
 def _cut(trajectory: Trajectory, scene: Scene) -> bool:
-    """Whether a run of fixed steps had to cut some."""
+    """Return whether a run of fixed steps had to cut some."""
     return trajectory.engine == "gauss" and (trajectory.steps - 1) * scene.solver.step > trajectory.times[-1]
 
 

@@ -55,7 +55,7 @@ class Inputs:
 
 
 def jumps(path: str) -> bool:
-    """Whether the value of an input may jump."""
+    """Return whether the value of an input may jump."""
     return path.startswith("loads.")
 
 

@@ -20,7 +20,7 @@ class Accepted:
         self._known = {parameter.path: (parameter.lower, parameter.upper) for parameter in parameters}
 
     def __call__(self, path: str, value: float) -> bool:
-        """Whether it may have a value at a path."""
+        """Return whether it may have a value at a path."""
         least, most = self._known.get(path, (np.inf, -np.inf))
         if least <= value <= most:
             return True

@@ -14,7 +14,7 @@ _HALVINGS = 60
 
 
 def accepts(scene: Scene, values: Mapping[str, float]) -> bool:
-    """Whether a scene may have values at paths."""
+    """Return whether a scene may have values at paths."""
     try:
         scene.with_values(values)
     except InputError:

@@ -54,7 +54,7 @@ class Evidence:
 
     @property
     def known(self) -> bool:
-        """Whether intervals can be told."""
+        """Return whether intervals can be told."""
         return self.possible and self.looked
 
     def score_test(self, model: ForwardModel) -> ScoreTest:

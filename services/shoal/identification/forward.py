@@ -304,7 +304,7 @@ class ForwardModel:
         return possible
 
     def _box_accepts(self, paths: tuple[str, ...]) -> bool:
-        """Whether the scene accepts the bounds of the parameters at some paths with each other."""
+        """Return whether the scene accepts the bounds of the parameters at some paths with each other."""
         if paths not in self._together:
             bounds = {one.path: (one.lower, one.upper) for one in self.problem.parameters.values()}
             self._together[paths] = all(path in bounds for path in paths) and all(
@@ -314,13 +314,13 @@ class ForwardModel:
         return self._together[paths]
 
     def accepts(self, path: str, value: float, scene: Scene | None = None) -> bool:
-        """Whether a scene, else the model's, may have a value at a path."""
+        """Return whether a scene, else the model's, may have a value at a path."""
         if scene is not None and scene is not self.scene:
             return accepts(scene, {path: value})
         return self._accepted(path, value)
 
     def can_be(self, point: Array, name: str | None = None) -> bool:
-        """Whether a point (parameters,) is a scene in a recording (else the first)."""
+        """Return whether a point (parameters,) is a scene in a recording (else the first)."""
         try:
             self.scene_at(point, name)
         except InputError:
@@ -430,5 +430,5 @@ def _with_shared(
 
 
 def _same_in_all(path: str, numbers: Array) -> bool:
-    """Whether a field other than a start is that of every lane: such lanes share one model, which is kept."""
+    """Return whether a field other than a start is that of every lane: such lanes share one model, which is kept."""
     return len(numbers) > 1 and not path.startswith("initial.") and bool(np.all(numbers == numbers[0]))

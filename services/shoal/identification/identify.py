@@ -144,7 +144,7 @@ def _assembled(model: ForwardModel) -> tuple[ForwardModel, list[str]]:
 
 
 def _closes(model: ForwardModel) -> bool:
-    """Whether the machine can be assembled where a search begins, in every recording."""
+    """Return whether the machine can be assembled where a search begins, in every recording."""
     aside = model.aside(engine=get_engine("gauss"), deadline=None)
 
     def closed(starts: Array) -> bool:

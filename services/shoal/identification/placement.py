@@ -55,7 +55,7 @@ class Placement:
         return cls(angles, base, first - along.sum(axis=0), along, across, turning)
 
     def knows(self, points: Array) -> bool:
-        """Whether points differ by angles alone."""
+        """Return whether points differ by angles alone."""
         others = np.ones(len(self.base), dtype=bool)
         others[list(self.angles)] = False
         return bool(np.all(points[:, others] == self.base[others]))

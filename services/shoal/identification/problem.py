@@ -95,7 +95,7 @@ class Parameter(Record):
 
     @property
     def logarithmic(self) -> bool:
-        """Whether it is sought by its logarithm."""
+        """Return whether it is sought by its logarithm."""
         positive = self.lower > 0 and (self.path or "").rpartition(".")[2] in _POSITIVE
         return self.scale == "log" or (self.scale == "auto" and positive)
 
@@ -108,7 +108,7 @@ class Parameter(Record):
 
     @property
     def of_measurement(self) -> bool:
-        """Whether it describes the measurement, not the machine."""
+        """Return whether it describes the measurement, not the machine."""
         return (self.path or "").startswith(RESERVED + ".")
 
 
@@ -228,7 +228,7 @@ class Problem(Record):
         return scene
 
     def _check_uncertain(self, scene: Scene) -> None:
-        """Whether what is uncertain are numbers of the scene. Raises InputError."""
+        """Return whether what is uncertain are numbers of the scene. Raises InputError."""
         for path, size in self.uncertain.items():
             where = f"{self.name}: uncertainties"
             try:
@@ -252,7 +252,7 @@ class Problem(Record):
                 )
 
     def _check_bounds(self, scene: Scene) -> None:
-        """Whether the scene accepts the bounds of each parameter. Raises InputError."""
+        """Return whether the scene accepts the bounds of each parameter. Raises InputError."""
         bounds = {
             name: (parameter.path, parameter.lower, parameter.upper)
             for name, parameter in self.parameters.items()
@@ -287,7 +287,7 @@ class Problem(Record):
         return {self.parameters[name].path or name: value, **found}
 
     def check_channels(self, channels: tuple[Channel, ...], scene: Scene, where: str) -> None:
-        """Whether a recording can be compared with the scene. Raises InputError."""
+        """Return whether a recording can be compared with the scene. Raises InputError."""
         if not channels:
             raise InputError(f"{where}: channels: none are stated, neither by the problem nor by the recording")
         for channel in channels:

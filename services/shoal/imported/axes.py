@@ -32,20 +32,20 @@ class Axes:
 
 
 def are_parallel(one: Array, other: Array) -> bool:
-    """Whether two unit vectors are along one line."""
+    """Return whether two unit vectors are along one line."""
     return bool(np.linalg.norm(np.cross(one, other)) < ROUNDED)
 
 
 def are_square(one: Array, other: Array) -> bool:
-    """Whether two unit vectors are at a right angle."""
+    """Return whether two unit vectors are at a right angle."""
     return bool(abs(one @ other) < ROUNDED)
 
 
 def span(source: Source, own: list[int]) -> bool:
-    """Whether the axes of three joints are those of a space."""
+    """Return whether the axes of three joints are those of a space."""
     return bool(abs(np.linalg.det(source.data.xaxis[own])) > ROUNDED)
 
 
 def meet(source: Source, own: list[int]) -> bool:
-    """Whether joints are in one place, to 1e-9 m."""
+    """Return whether joints are in one place, to 1e-9 m."""
     return all(np.allclose(source.data.xanchor[one], source.data.xanchor[own[0]], atol=1e-9) for one in own)

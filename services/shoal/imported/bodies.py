@@ -38,7 +38,9 @@ def _mass(source: Source, body: int) -> float:
 
 
 def is_mass(source: Source, body: int) -> bool:
-    """Whether a body only slides against the ground, each way, and is held and seen at its centre: a point mass."""
+    """Return whether a body only slides against the ground, each way, and is held and seen at its centre: a point
+    mass.
+    """
     model, own = source.model, source.own(body)
     slides = len(own) == 3 and np.all(model.jnt_type[own] == int(source.mujoco.mjtJoint.mjJNT_SLIDE))
     if not slides or not span(source, own) or source.owners[model.body_parentid[body]] != 0:
@@ -72,6 +74,6 @@ def initial(source: Source, body: int, turns: bool) -> dict[str, Any]:
 
 
 def _slides(source: Source, body: int) -> bool:
-    """Whether its joints leave the place of a body free."""
+    """Return whether its joints leave the place of a body free."""
     kinds = source.mujoco.mjtJoint
     return bool(np.any(np.isin(source.model.jnt_type[source.own(body)], [kinds.mjJNT_SLIDE, kinds.mjJNT_FREE])))

@@ -48,7 +48,7 @@ def _planar(normal: Array, rotation: str) -> dict[str, Any]:
 
 
 def _is_plane(kinds: Any, turns: list[Any], axes: list[Array]) -> bool:
-    """Whether two slides, and a hinge or a ball after them, leave a plane and turns about its normal, or all."""
+    """Return whether two slides, and a hinge or a ball after them, leave a plane and turns about its normal, or all."""
     normal = np.cross(axes[0], axes[1])
     if np.linalg.norm(normal) < ROUNDED or turns not in ([], [kinds.mjJNT_HINGE], [kinds.mjJNT_BALL]):
         return False

@@ -56,7 +56,9 @@ def hang(source: Source, body: int, axes: Axes, parts: Parts) -> None:
 
 
 def _turns_anyhow(source: Source, turning: list[int]) -> bool:
-    """Whether joints that do not slide leave a body every turn about a place: a ball, or hinges that stand for one."""
+    """Return whether joints that do not slide leave a body every turn about a place: a ball, or hinges that stand for
+    one.
+    """
     kinds, found = source.mujoco.mjtJoint, source.model.jnt_type[turning].tolist()
     gimbal = found == [int(kinds.mjJNT_HINGE)] * 3
     return found == [int(kinds.mjJNT_BALL)] or (gimbal and meet(source, turning) and span(source, turning))

@@ -31,7 +31,7 @@ def add_resistance(source: Source, own: list[int], made: dict[str, Any], parts: 
 
 
 def _is_simple(source: Source, one: int, made: dict[str, Any]) -> bool:
-    """Whether a joint of a scene has the one coordinate of one of MuJoCo's."""
+    """Return whether a joint of a scene has the one coordinate of one of MuJoCo's."""
     kinds = source.mujoco.mjtJoint
     words = {"revolute": kinds.mjJNT_HINGE, "slider": kinds.mjJNT_SLIDE}
     return bool(words.get(made["kind"]) == kinds(source.model.jnt_type[one]))

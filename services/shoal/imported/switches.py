@@ -6,7 +6,7 @@ from typing import Any
 
 
 def disables(model: Any, bit: Any) -> bool:
-    """Whether a flag (mjtDisableBit) of a model of MuJoCo's is set."""
+    """Return whether a flag (mjtDisableBit) of a model of MuJoCo's is set."""
     return bool(model.opt.disableflags & int(bit))
 
 

@@ -17,7 +17,7 @@ from shoal.mechanics.numerics.tile import Array, Number
 
 
 def is_zero(value: Number) -> bool:
-    """Whether a coefficient vanishes in every lane."""
+    """Return whether a coefficient vanishes in every lane."""
     return not np.any(value)
 
 

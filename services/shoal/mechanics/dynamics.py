@@ -104,7 +104,7 @@ def _derived_rows(tile: Tile, derived: Derived, z: Array, begin: int, end: int, 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def loaded(m: Arrays) -> bool:
-    """Whether forces depend on rates or on time."""
+    """Return whether forces depend on rates or on time."""
     a = m.applied
     return m.driven or m.forces.size + a.fixed + a.following + a.turning + a.twisting > 0 or m.damped
 
@@ -129,7 +129,9 @@ def force(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, f: Ar
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def free(m: Arrays) -> bool:
-    """Whether nothing acts on the machine but weight and undamped elements, and no constraint: as fast ones are."""
+    """Return whether nothing acts on the machine but weight and undamped elements, and no constraint: as fast ones
+    are.
+    """
     return m.constraints.size == 0 and m.gates.sought == 0 and not loaded(m)
 
 

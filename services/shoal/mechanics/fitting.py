@@ -300,7 +300,7 @@ def _outwards(elastic: Function, middle: Piecewise) -> list[Piecewise]:
 
 
 def _has_digits(law: Piecewise, elastic: Function, at: Array) -> bool:
-    """Whether a law is met at these elongations to so many digits of its values there."""
+    """Return whether a law is met at these elongations to so many digits of its values there."""
     wanted = np.asarray(elastic(at.astype(np.longdouble)), dtype=float)
     found = np.array([value(law, float(x)) for x in at])
     return bool(np.all(np.abs(found - wanted) <= _DIGITS * np.abs(wanted)))

@@ -158,7 +158,7 @@ class BeamFrame:
 
 
 def is_on_axis(place: Place) -> bool:
-    """Whether a place of a rod has no offset from its axis."""
+    """Return whether a place of a rod has no offset from its axis."""
     return not any(np.any(offset) for offset in place[1:])
 
 

@@ -53,7 +53,8 @@ def halts(model: Model, end: float, longest: float, adaptive: bool) -> Halts:
 
 @njit(cache=True, error_model="numpy")
 def leapt(tile: Tile, held: Forces, halts: Halts, before: Array, z: Array, memory: Array, room: Array) -> bool:
-    """Whether a step went too far across a part of a force law; before: elongations at its beginning, (forces, lanes).
+    """Return whether a step went too far across a part of a force law; before: elongations at its beginning, (forces,
+    lanes).
 
     z: coordinates at its end, derived rows filled. Pointers but for halts and before.
     """

@@ -67,7 +67,7 @@ class Meet(JointCondition):
 
     @property
     def within(self) -> bool:
-        """Whether both are of one body: a rod that closes upon itself."""
+        """Return whether both are of one body: a rod that closes upon itself."""
         return self.first.body == self.second.body
 
     def pushes(self, motion: Any) -> UnitVectors:
@@ -90,7 +90,7 @@ class Along(JointCondition):
 
     @property
     def is_fixed(self) -> bool:
-        """Whether the line rests on the ground."""
+        """Return whether the line rests on the ground."""
         return self.first.body == GROUND and not isinstance(self.first.point, str) and not self.held
 
     def pushes(self, motion: Any) -> UnitVectors:
@@ -129,12 +129,12 @@ class Turned(JointCondition):
 
     @property
     def driven(self) -> bool:
-        """Whether it follows a function of time."""
+        """Return whether it follows a function of time."""
         return isinstance(self.angle, Function)
 
     @property
     def is_of_start(self) -> bool:
-        """Whether any angle that the start has is kept."""
+        """Return whether any angle that the start has is kept."""
         return self.angle is None and self.either is None
 
     def kept(self, ahead: Number) -> Number:

@@ -179,7 +179,9 @@ class Machine:
 
     @cached_property
     def _halves(self) -> bool:
-        """Whether a tile may be used by half: explicit steps of elastic elements, which then act on that half only."""
+        """Return whether a tile may be used by half: explicit steps of elastic elements, which then act on that half
+        only.
+        """
         explicit = facts_of(self.choice.name).explicit and not facts_of(self.choice.name).adaptive
         return explicit and self._alike and self.model.flexible > 0 and not self.model.constraints.size
 

@@ -141,7 +141,7 @@ class Model:
 
     @property
     def varies(self) -> bool:
-        """Whether lanes differ in more than their initial state."""
+        """Return whether lanes differ in more than their initial state."""
         parts = self.derived, self.elements, self.forces, self.applied, self.constraints, self.rubbing
         return varies((self.mass_values, self.weight, *parts))
 
@@ -169,12 +169,12 @@ class Model:
 
     @property
     def modal(self) -> bool:
-        """Whether any body bends by modes."""
+        """Return whether any body bends by modes."""
         return any(isinstance(frame, ModalFrame) for frame in self.frames.values())
 
     @property
     def elastic(self) -> bool:
-        """Whether anything stores elastic energy."""
+        """Return whether anything stores elastic energy."""
         return (
             self.flexible > 0 or bool(np.any(self.forces.law[STIFFNESS::LAW])) or bool(np.any(self.forces.table >= 0))
         )
@@ -214,7 +214,7 @@ class Model:
 
     @property
     def _redundant(self) -> bool:
-        """Whether some constraints depend on others at the start of the first lane."""
+        """Return whether some constraints depend on others at the start of the first lane."""
         c, d, first = self.constraints, self.derived, self.q0[:, 0]
         of_row = np.repeat(np.arange(len(d.constant)), np.diff(d.start))
         parts = np.bincount(of_row, d.coefficient[:, 0] * first[d.source], len(d.constant))

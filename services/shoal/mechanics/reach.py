@@ -87,7 +87,7 @@ def stretch(scene: Scene, energy: Array) -> Array:
 
 
 def tethered(scene: Scene) -> bool:
-    """Whether revolute joints and welds tie every body to fixed ground."""
+    """Return whether revolute joints and welds tie every body to fixed ground."""
     held, frontier = {GROUND}, [GROUND]
     tethers = _tethers(scene)
     while frontier:

@@ -148,6 +148,6 @@ class Limits:
 
 
 def _constant(joint: Joint) -> bool:
-    """Whether a joint has no part that a function of time moves."""
+    """Return whether a joint has no part that a function of time moves."""
     functions = (getattr(joint, field, None) for field in ("angle", "length", "value"))
     return all(f.number is not None for f in functions if isinstance(f, Function))

@@ -46,7 +46,7 @@ class Kernel(NamedTuple):
 
     @property
     def cached(self) -> bool:
-        """Whether the cache has it."""
+        """Return whether the cache has it."""
         function = _function(self.name)
         found = function._cache
         return found._index_key(self.kinds, function.targetctx.codegen()) in found._cache_file._load_index()

@@ -14,7 +14,9 @@ if TYPE_CHECKING:
 
 
 def tells_places(motion: Trajectory, found: Selection | None = None) -> bool:
-    """Whether places of markers may be told: of a run that is believed, or misses a tolerance by a known error."""
+    """Return whether places of markers may be told: of a run that is believed, or misses a tolerance by a known
+    error.
+    """
     return motion.ok or (found is not None and bool(np.isfinite(found.chosen.error)))
 
 

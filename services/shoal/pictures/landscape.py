@@ -111,7 +111,7 @@ def _mark(axes: Axes, answer: Answer, found: Landscape) -> None:
 
 
 def has_ellipse(answer: Answer) -> bool:
-    """Whether the covariance is regular; it is not where a direction is open."""
+    """Return whether the covariance is regular; it is not where a direction is open."""
     return not answer.linearised.unknown.size
 
 

@@ -47,7 +47,7 @@ def _draw(panel: Axes, estimate: Estimate, name: str, profile: Profile) -> None:
 
 
 def _says(estimate: Estimate) -> str:
-    """Whether the data bound each parameter on both sides, in words."""
+    """Return whether the data bound each parameter on both sides, in words."""
     unbounded = [name for name, profile in estimate.profiles.items() if profile.open]
     if unbounded:
         return f"{estimate.problem}: the data leave a side of {', '.join(unbounded)} open"

@@ -88,7 +88,7 @@ def _lead(trajectory: Trajectory, selection: Selection | None) -> str:
 
 
 def _is_flat(trajectory: Trajectory) -> bool:
-    """Whether one angle tells how a body is turned."""
+    """Return whether one angle tells how a body is turned."""
     return trajectory.axes == "xy"
 
 

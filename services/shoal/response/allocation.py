@@ -71,7 +71,7 @@ class Allocation:
 
     @property
     def ok(self) -> bool:
-        """Whether a confirming study keeps the limit."""
+        """Return whether a confirming study keeps the limit."""
         return not self.message
 
     @property

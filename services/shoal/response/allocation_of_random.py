@@ -144,12 +144,12 @@ class Confirmed:
         return float(lower[-1]), float(upper[-1])
 
     def near(self, target: float) -> bool:
-        """Whether the probability is the target as far as can be told, and not above."""
+        """Return whether the probability is the target as far as can be told, and not above."""
         chance = self.estimate.probability
         return 0 < chance <= target <= max(chance / NEAR, float(np.nan_to_num(self.interval[1])))
 
     def kept(self, target: float) -> bool:
-        """Whether the probability is not above the target."""
+        """Return whether the probability is not above the target."""
         return self.estimate.probability <= target
 
     def message(self, target: float, widest: Array) -> str:

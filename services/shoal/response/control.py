@@ -40,7 +40,7 @@ def missed(study: Study, surrogate: Surrogate) -> Array:
 
 
 def contradict(study: Study, missed: Array, error: Array) -> BoolArray:
-    """Whether runs are missed by more than the error that was told, and by what matters, (columns,)."""
+    """Return whether runs are missed by more than the error that was told, and by what matters, (columns,)."""
     return np.asarray(missed > SAFETY * error + FINE_GAP * study.widths(study.runs.values))
 
 

@@ -100,7 +100,7 @@ class Inputs:
 
     @property
     def mixed(self) -> bool:
-        """Whether some parameters are random and others intervals."""
+        """Return whether some parameters are random and others intervals."""
         return bool(self.random.any() and not self.random.all())
 
     def some(self, which: BoolArray) -> Inputs:
@@ -139,7 +139,7 @@ class Inputs:
         return found
 
     def _standard(self, k: int) -> bool:
-        """Whether the germ of a parameter is a standard normal variable whatever its distribution."""
+        """Return whether the germ of a parameter is a standard normal variable whatever its distribution."""
         return k in self._correlated
 
     @property

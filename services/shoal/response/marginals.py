@@ -27,7 +27,7 @@ class Marginal(Protocol):
 
     @property
     def random(self) -> bool:
-        """Whether it has a distribution."""
+        """Return whether it has a distribution."""
         ...
 
     @property

@@ -101,7 +101,7 @@ class _Nothing:
     name: str
 
     def __call__(self, estimated: Verification | None) -> bool:
-        """Whether these errors are nothing; None where the run has failed."""
+        """Return whether these errors are nothing; None where the run has failed."""
         if estimated is None or estimated.rejected:
             return False
         errors = (estimated.errors.known.get(source, 0.0) for source in ("time", "mesh", "bending"))

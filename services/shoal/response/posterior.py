@@ -35,7 +35,7 @@ ALIKE = 0.999999
 
 
 def is_source(given: str) -> bool:
-    """Whether it names such a file."""
+    """Return whether it names such a file."""
     return given.endswith(ENDINGS) and "=" not in given and "~" not in given
 
 

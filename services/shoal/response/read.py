@@ -281,7 +281,7 @@ def _empirical(name: str, file: str, text: str) -> Marginal:
 
 
 def _is_name(lines: list[str]) -> bool:
-    """Whether the first line of a column names it."""
+    """Return whether the first line of a column names it."""
     try:
         float(lines[0].split(",")[0]) if lines else None
     except ValueError:

@@ -129,7 +129,7 @@ class Response:
 
     @property
     def ok(self) -> bool:
-        """Whether the answer can be believed as it stands."""
+        """Return whether the answer can be believed as it stands."""
         return self.status == "ok"
 
     @property

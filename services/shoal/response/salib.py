@@ -36,7 +36,7 @@ _CALL = re.compile(r"^([a-z-]+)\((.*)\)$")
 
 
 def is_problem(given: Any) -> bool:
-    """Whether a mapping is a problem of SALib."""
+    """Return whether a mapping is a problem of SALib."""
     return isinstance(given, Mapping) and {"names", "bounds"} <= given.keys() and "num_vars" in given
 
 

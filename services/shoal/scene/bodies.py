@@ -215,7 +215,7 @@ class Rod(Record):
 
     @property
     def shears(self) -> bool:
-        """Whether its element has shear and the rotary inertia of its sections."""
+        """Return whether its element has shear and the rotary inertia of its sections."""
         return _SHEARS[self.element]
 
     @property
@@ -235,12 +235,12 @@ class Rod(Record):
 
     @property
     def straight(self) -> bool:
-        """Whether the unstrained rod is neither curved nor twisted."""
+        """Return whether the unstrained rod is neither curved nor twisted."""
         return not (self.curvature or self.side_curvature or self.twist)
 
     @property
     def tapered(self) -> bool:
-        """Whether the section changes along the rod."""
+        """Return whether the section changes along the rod."""
         return self.end_height is not None or self.end_width is not None
 
     def section_at(self, x: Any) -> Section:

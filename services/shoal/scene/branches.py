@@ -195,7 +195,7 @@ class _Cutter:
 
 
 def _is_zero(node: Node, t: float) -> bool:
-    """Whether a tree may be 0 at one place."""
+    """Return whether a tree may be 0 at one place."""
     low, high = at(node, np.array([t]))
     return bool(low[0, 0] <= 0 <= high[0, 0])
 

@@ -85,7 +85,7 @@ def _check_plane(part: Any, path: str) -> None:
 
 
 def _is_spatial(name: str, value: Any) -> bool:
-    """Whether a field says what nothing in the plane has."""
+    """Return whether a field says what nothing in the plane has."""
     if name in ("axis", "second_axis"):
         return value is not None and value not in (_Z, "x", "y")
     if name == "z":
@@ -105,7 +105,7 @@ _VECTORS = {"gravity", "position", "velocity", "point", "force", "centre_of_mass
 
 
 def is_flat(scene: Any) -> bool:
-    """Whether nothing that a scene in space states leads out of the plane z = 0."""
+    """Return whether nothing that a scene in space states leads out of the plane z = 0."""
     return _is_flat(scene, "") and not any(joint.kind in SPATIAL_KINDS for joint in scene.joints.values())
 
 

@@ -49,7 +49,8 @@ def at(node: Node, t: Array) -> Pair:
 
 
 def common_zero(above: Node, below: Node, t: float) -> bool:
-    """Whether both sides of a fraction vanish at t and the lower one has a slope there, so that there is no pole.
+    """Return whether both sides of a fraction vanish at t and the lower one has a slope there, so that there is no
+    pole.
 
     Only what vanishes to the last bit counts, as t and sin(t) do at 0.
     """

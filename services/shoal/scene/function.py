@@ -134,7 +134,9 @@ class Function(Record):
         return np.asarray(value)
 
     def begins_like(self, other: Any, *, slope: bool) -> bool:
-        """Whether another function, as a user may write it, has the same value at time zero; slope: that as well."""
+        """Return whether another function, as a user may write it, has the same value at time zero; slope: that as
+        well.
+        """
         try:
             other = Function.model_validate(other)
             alike = bool(self(np.zeros(1))[0] == other(np.zeros(1))[0])

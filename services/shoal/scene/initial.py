@@ -48,7 +48,7 @@ class InitialState(Record):
     guess: tuple[Quantity, ...] = ()
 
     def stated(self, quantity: Quantity) -> bool:
-        """Whether the user gave this quantity a value."""
+        """Return whether the user gave this quantity a value."""
         return getattr(self, quantity) is not None
 
 

@@ -67,12 +67,12 @@ class Resisted(Tie):
 
     @property
     def dry(self) -> bool:
-        """Whether it has dry friction of either kind."""
+        """Return whether it has dry friction of either kind."""
         return bool(self.coulomb or self.mu)
 
     @property
     def resists(self) -> bool:
-        """Whether it does, in any way."""
+        """Return whether it does, in any way."""
         return any(np.any(size) for size in (self.friction, self.drag, self.coulomb, self.share))
 
     def resistance(self, rate: Array, force: Array | float = 0.0) -> Array:
@@ -126,7 +126,7 @@ class Universal(Tie):
 
     @property
     def oblique(self) -> bool:
-        """Whether the axes are at no right angle, in any lane."""
+        """Return whether the axes are at no right angle, in any lane."""
         first, second = np.stack(np.broadcast_arrays(*self.axis, *self.second_axis)).reshape(2, 3, -1)
         lengths = np.linalg.norm(first, axis=0) * np.linalg.norm(second, axis=0)
         return bool(np.any(np.abs(np.sum(first * second, axis=0)) > 1e-6 * lengths))

@@ -64,7 +64,9 @@ def lanes_of(part: Any) -> int:
 
 
 def shared(place: Any, path: list[str]) -> bool:
-    """Whether lanes cannot differ in the number at a path: it lies in a function of time, or in a list of lists."""
+    """Return whether lanes cannot differ in the number at a path: it lies in a function of time, or in a list of
+    lists.
+    """
     for part, below in zip(path, [*path[1:], ""], strict=True):
         if isinstance(place, Mapping):
             place = place.get(part)

@@ -63,7 +63,7 @@ def _scalars(annotation: Any) -> Iterator[Any]:
 
 
 def _holds_truth(given: Any) -> bool:
-    """Whether a value is, or has among its parts, true or false."""
+    """Return whether a value is, or has among its parts, true or false."""
     parts = given.values() if isinstance(given, dict) else given if isinstance(given, list | tuple) else ()
     return isinstance(given, bool) or any(map(_holds_truth, parts))
 
@@ -169,7 +169,7 @@ def one_line(error: ValidationError, what: str, model: type[Record] | None = Non
 
 
 def _lacks(error: Any) -> bool:
-    """Whether a list is too short."""
+    """Return whether a list is too short."""
     return error["type"] == "missing" and isinstance(error["loc"][-1], int)
 
 

@@ -220,7 +220,7 @@ class Scene(Record):
 
     @property
     def starts_at_rest(self) -> bool:
-        """Whether the start is the place of rest near the one that is stated."""
+        """Return whether the start is the place of rest near the one that is stated."""
         return self.initial_from == "statics"
 
     @property
@@ -324,7 +324,7 @@ class Scene(Record):
         return on if on in self.bodies and self.bodies[on].element not in FRAMED else None
 
     def _has(self, path: str, value: Any) -> bool:
-        """Whether the scene states this value there already, or a function that begins like this one."""
+        """Return whether the scene states this value there already, or a function that begins like this one."""
         head, *rest = path.split(".")
         if head == "initial" and len(rest) > 1 and getattr(self.initial.get(rest[0]), rest[1], None) is None:
             return False
@@ -334,7 +334,9 @@ class Scene(Record):
             return False
 
     def _begins_there(self, path: str, value: Any, *, slope: bool = False) -> bool:
-        """Whether a function of time that drives joints has this value at the start already; slope: that as well."""
+        """Return whether a function of time that drives joints has this value at the start already; slope: that as
+        well.
+        """
         try:
             stated = self.value(path) if _places(path.split(".")) else None
         except InputError:
@@ -425,6 +427,6 @@ def _stating(path: str, value: Any) -> list[str]:
 
 
 def _places(path: list[str]) -> bool:
-    """Whether a field places joints."""
+    """Return whether a field places joints."""
     shape = path[0] == "bodies" and len(path) > 2 and path[2] in _SHAPES
     return shape or path[0] in ("joints", "ground_points")

@@ -64,5 +64,5 @@ class Solver(Record):
 
     @property
     def caps_inertia(self) -> bool:
-        """Whether runs with these settings raise the inertia of axial vibrations."""
+        """Return whether runs with these settings raise the inertia of axial vibrations."""
         return self.inertia_cap and self.integrator == "leapfrog"

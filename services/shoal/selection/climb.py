@@ -119,7 +119,9 @@ class Runs:
         return self._done[key]
 
     def knows(self, rod: str, level: Level) -> bool:
-        """Whether a rod can be modelled so: not every one can bend by modes, or has nodes where joints hold it."""
+        """Return whether a rod can be modelled so: not every one can bend by modes, or has nodes where joints hold
+        it.
+        """
         try:
             self.forecast.own(rod, level)
             if level.element == "director-rod":

@@ -36,7 +36,7 @@ class Rung:
 
     @property
     def ok(self) -> bool:
-        """Whether the run may be believed."""
+        """Return whether the run may be believed."""
         return self.trajectory.ok
 
     @property

@@ -38,12 +38,12 @@ class Effect:
 
     @property
     def falls(self) -> bool:
-        """Whether the part lowers what was measured, beyond chance."""
+        """Return whether the part lowers what was measured, beyond chance."""
         return self.upper < 0.0
 
     @property
     def rises(self) -> bool:
-        """Whether the part raises what was measured, beyond chance."""
+        """Return whether the part raises what was measured, beyond chance."""
         return self.lower > 0.0
 
 

@@ -48,7 +48,7 @@ class Contender:
 
     @property
     def seeded(self) -> bool:
-        """Whether it draws lots."""
+        """Return whether it draws lots."""
         return self.name not in DETERMINISTIC
 
 

@@ -47,7 +47,7 @@ class Run:
 
     @property
     def success(self) -> bool:
-        """Whether it ends close to the truth."""
+        """Return whether it ends close to the truth."""
         return self.error <= CLOSE
 
 

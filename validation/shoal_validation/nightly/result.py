@@ -28,7 +28,7 @@ class Verdict(StrEnum):
 
     @property
     def fine(self) -> bool:
-        """Whether nobody needs to look."""
+        """Return whether nobody needs to look."""
         return self in (Verdict.PASSED, Verdict.NOT_POSSIBLE)
 
 
@@ -90,7 +90,7 @@ class Night:
 
     @property
     def passed(self) -> bool:
-        """Whether every line is as it should be."""
+        """Return whether every line is as it should be."""
         return all(line.verdict.fine for line in self.lines)
 
     @property

@@ -52,7 +52,7 @@ class Case:
 
     @property
     def known(self) -> bool:
-        """Whether the finer model is known well enough to judge by."""
+        """Return whether the finer model is known well enough to judge by."""
         return bool(self.reference_error < 0.5 * self.tolerance)
 
 
@@ -88,7 +88,7 @@ def study(machine: Draw, exhaustive: bool = False, patience: float = PATIENCE) -
 
 
 def _of(rung: Rung, limits: Mapping[str, str]) -> bool:
-    """Whether a model belongs to the theory whose limits are the truth."""
+    """Return whether a model belongs to the theory whose limits are the truth."""
     return all(level in LADDERS[limits[rod]] for rod, level in rung.levels.items())
 
 

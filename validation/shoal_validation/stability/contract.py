@@ -56,7 +56,7 @@ class Method:
 
     @property
     def ours(self) -> bool:
-        """Whether Shoal's own solver runs."""
+        """Return whether Shoal's own solver runs."""
         return self.engine.name == "gauss"
 
 

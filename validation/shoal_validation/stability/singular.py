@@ -47,7 +47,7 @@ def reference(distance: float, ratio: float) -> Array:
 
 
 def left(run: Trajectory) -> bool:
-    """Whether the coupler has turned: the machine went on as an antiparallelogram."""
+    """Return whether the coupler has turned: the machine went on as an antiparallelogram."""
     across = run.marker("B") - run.marker("A") - np.array([2.0, 0.0])
     return bool(np.max(np.linalg.norm(across, axis=1)) > TURNED)
 

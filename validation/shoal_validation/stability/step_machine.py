@@ -18,7 +18,7 @@ SIZES = {"pendulum": 1.0, "double-pendulum": 3.0, "parallelogram": 1.0, "slider-
 
 
 def _stuck(run: Trajectory) -> bool:
-    """Whether the slider has stayed at the crank's bearing, about which crank and rod then turn as one."""
+    """Return whether the slider has stayed at the crank's bearing, about which crank and rod then turn as one."""
     return bool(np.max(np.abs(run.marker("B")[:, 0] - 2.0 * run.marker("A")[:, 0])) > TURNED)
 
 

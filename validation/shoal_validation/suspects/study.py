@@ -50,7 +50,7 @@ class Trial:
 
     @property
     def first(self) -> bool:
-        """Whether the cause is among the suspects named first."""
+        """Return whether the cause is among the suspects named first."""
         return self.cause in self.named
 
     def __str__(self) -> str:

@@ -101,7 +101,7 @@ class Cell:
 
     @property
     def silent(self) -> bool:
-        """Whether outer bounds are wrong and nothing tells."""
+        """Return whether outer bounds are wrong and nothing tells."""
         return self.beyond > OFF
 
 

@@ -48,7 +48,7 @@ class Met:
 
     @property
     def kept(self) -> tuple[bool, bool]:
-        """Whether the error told is not smaller than the true one."""
+        """Return whether the error told is not smaller than the true one."""
         return tuple(true <= told + 1e-7 for true, told in zip(self.errors, self.told, strict=True))  # type: ignore[return-value]
 
 

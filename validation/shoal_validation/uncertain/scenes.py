@@ -253,7 +253,7 @@ class Tried:
 
     @property
     def kept(self) -> bool:
-        """Whether no run lies further out than the gap told."""
+        """Return whether no run lies further out than the gap told."""
         assert self.response.bounds is not None
         gap = self.response.bounds.gap
         return math.isnan(gap) or self.beyond <= gap + ROUNDING

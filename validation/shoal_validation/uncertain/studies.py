@@ -121,7 +121,7 @@ class Judged:
 
     @property
     def kept(self) -> bool:
-        """Whether no run lies further out than the gap told, and every bound is attained."""
+        """Return whether no run lies further out than the gap told, and every bound is attained."""
         return math.isnan(self.gap) or (self.beyond <= self.gap + ROUNDING and self.broken <= ROUNDING)
 
 

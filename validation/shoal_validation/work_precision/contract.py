@@ -77,7 +77,7 @@ class Point:
 
     @property
     def ok(self) -> bool:
-        """Whether it may be drawn."""
+        """Return whether it may be drawn."""
         return self.status == Status.OK and bool(np.isfinite(self.error))
 
     @property

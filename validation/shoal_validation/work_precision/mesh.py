@@ -19,7 +19,7 @@ rod. G stands for Exudyn's geometrically exact beam in place of each cable; two 
 
 
 def twisted(scene: Scene) -> bool:
-    """Whether its rods are director rods, which bend about two axes and twist."""
+    """Return whether its rods are director rods, which bend about two axes and twist."""
     return any(body.element == "director-rod" for body in scene.bodies.values())
 
 

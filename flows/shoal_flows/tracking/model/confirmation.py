@@ -34,7 +34,7 @@ class Confirmation:
 
     @property
     def ok(self) -> bool:
-        """Whether the second engine sees the same motion."""
+        """Return whether the second engine sees the same motion."""
         return self.away <= self.allowed
 
     def __str__(self) -> str:

@@ -70,7 +70,7 @@ class ShootingResult:
 
     @property
     def out_of_time(self) -> bool:
-        """Whether the limit ended it."""
+        """Return whether the limit ended it."""
         return "WallTime" in self.message
 
 

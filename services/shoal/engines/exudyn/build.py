@@ -91,7 +91,7 @@ class Machine:
 
     @property
     def driven(self) -> bool:
-        """Whether motion is prescribed: then energy comes and goes through constraints, and is not followed."""
+        """Return whether motion is prescribed: then energy comes and goes through constraints, and is not followed."""
         joints = self.scene.joints.values()
         return bool(self.scene.ground_points) or any(isinstance(joint, DrivenAngle) for joint in joints)
 

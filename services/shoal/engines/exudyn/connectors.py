@@ -51,7 +51,7 @@ class Law:
 
     @property
     def linear(self) -> bool:
-        """Whether Exudyn's own linear law is enough; it takes no negative stiffness."""
+        """Return whether Exudyn's own linear law is enough; it takes no negative stiffness."""
         return self.stiffness >= 0 and not (self.cubic or self.drag or self.coulomb or self.elastic)
 
     def stored(self, x: Array) -> Array:

@@ -61,7 +61,7 @@ class Ends:
         return float(other - one)
 
     def is_point(self, at: Attachment) -> bool:
-        """Whether an attachment is on a point mass, which has no direction."""
+        """Return whether an attachment is on a point mass, which has no direction."""
         return isinstance(self.scene.bodies.get(at.body), PointMass)
 
     def require_direction(self, field: str, *sides: Attachment) -> None:

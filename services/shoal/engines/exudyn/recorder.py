@@ -76,7 +76,7 @@ def key_of(number: Any) -> Key:
 
 
 def is_number_of_item(value: Any) -> bool:
-    """Whether a value is such a number of Exudyn's."""
+    """Return whether a value is such a number of Exudyn's."""
     return type(value).__name__ in ("NodeIndex", "ObjectIndex", "MarkerIndex", "LoadIndex")
 
 

@@ -70,7 +70,7 @@ class Tree:
                         waiting.append(child.body)
 
     def _hangs(self, joint: Any) -> bool:
-        """Whether a body may hang on another by a joint."""
+        """Return whether a body may hang on another by a joint."""
         sides = (getattr(joint, "first", None), getattr(joint, "second", None))
         masses = any(side is None or isinstance(self._scene.bodies.get(side.body), PointMass) for side in sides)
         return not (masses or isinstance(joint, Distance))

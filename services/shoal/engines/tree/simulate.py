@@ -51,7 +51,7 @@ class SpatialMotion:
 
     @property
     def ok(self) -> bool:
-        """Whether the motion may be believed."""
+        """Return whether the motion may be believed."""
         return self.status is Status.OK
 
     def point(self, name: str) -> Array:

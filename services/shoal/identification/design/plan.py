@@ -79,7 +79,7 @@ class Design:
 
     @property
     def ok(self) -> bool:
-        """Whether the best sensor tells the parameter, by sensitivities that can be believed."""
+        """Return whether the best sensor tells the parameter, by sensitivities that can be believed."""
         return not self.message
 
     def to_json(self) -> dict[str, Any]:
@@ -236,7 +236,7 @@ def _model(problem: Problem, scene: Scene, channels: tuple[Channel, ...], noise:
 
 
 def has_data(problem: Problem) -> bool:
-    """Whether a problem brings its own data."""
+    """Return whether a problem brings its own data."""
     return all(isinstance(source, EngineSource) or source.path for source in problem.sources.values())
 
 

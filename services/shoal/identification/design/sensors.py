@@ -87,7 +87,7 @@ class Sensor:
 
     @property
     def in_joint(self) -> bool:
-        """Whether it stands in a joint."""
+        """Return whether it stands in a joint."""
         return self.quantity in ("force", "torque")
 
     @property

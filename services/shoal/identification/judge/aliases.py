@@ -122,7 +122,7 @@ def _line(model: ForwardModel, point: Array, k: int, values: Array) -> Array:
 
 
 def _unresolved(model: ForwardModel, point: Array, k: int) -> bool:
-    """Whether the bounds of a parameter hold motions that swing faster than the samples show."""
+    """Return whether the bounds of a parameter hold motions that swing faster than the samples show."""
     ends = [np.linspace(point[k], end, _LOOKS + 1)[1:] for end in (model.lower[k], model.upper[k])]
     points = _line(model, point, k, np.concatenate([point[k : k + 1], *ends]))
     for name in model.measurement.recordings:

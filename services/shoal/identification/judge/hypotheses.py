@@ -42,7 +42,7 @@ class Hypothesis:
 
     @property
     def significant(self) -> bool:
-        """Whether the data contradict what was taken as known."""
+        """Return whether the data contradict what was taken as known."""
         return self.corrected < SIGNIFICANT
 
 

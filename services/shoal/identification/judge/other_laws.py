@@ -93,7 +93,8 @@ def _whole(found: list[Value]) -> tuple[float, float]:
 
 
 def _most(model: ForwardModel, point: Array, seen: Sensitivity, column: Array) -> tuple[bool, Array] | None:
-    """Whether a law that was left out fits, and the fit with the most of it that may be; None where it has no effect.
+    """Return whether a law that was left out fits, and the fit with the most of it that may be; None where it has no
+    effect.
 
     column: its effect on the residuals, for each unit of it. The most is the upper end of its interval, or less where
     a parameter comes to its bound.

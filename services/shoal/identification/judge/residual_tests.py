@@ -88,7 +88,7 @@ class ResidualTests:
 
     @property
     def made(self) -> bool:
-        """Whether there was a residual to test."""
+        """Return whether there was a residual to test."""
         return bool(np.isfinite(self.size))
 
     @property
@@ -103,36 +103,38 @@ class ResidualTests:
 
     @property
     def white(self) -> bool:
-        """Whether the residuals may be white noise."""
+        """Return whether the residuals may be white noise."""
         return self.chance_of_white > _DOUBT
 
     @property
     def too_large(self) -> bool:
-        """Whether the residual is larger than the stated noise, by a chance that leaves little doubt."""
+        """Return whether the residual is larger than the stated noise, by a chance that leaves little doubt."""
         return self.noise_stated and self.ratio > 1.0 and self.chance_of_size < _DOUBT
 
     @property
     def systematic(self) -> bool:
-        """Whether the residual is more than noise: larger than stated, and not white; or much larger."""
+        """Return whether the residual is more than noise: larger than stated, and not white; or much larger."""
         if self.noise_stated:
             return self.too_large and (not self.white or self.ratio > _LOUD)
         return self.ratio > _LARGE and self.chance_of_size < _SURE
 
     @property
     def limited(self) -> bool:
-        """Whether the model, and not the noise, limits what the fit tells."""
+        """Return whether the model, and not the noise, limits what the fit tells."""
         return self.systematic or self.excess > 0.0
 
     @property
     def explains_nothing(self) -> bool:
-        """Whether a constant would fit as well, or hardly worse where nobody said that the noise is so large."""
+        """Return whether a constant would fit as well, or hardly worse where nobody said that the noise is so large."""
         if self.noise_stated:
             return self.too_large and self.size >= self.signal > 0.0
         return self.size >= _MOSTLY * self.signal > 0.0
 
     @property
     def wrong_model(self) -> bool:
-        """Whether the model is refuted: against a stated noise, against a good part of the signal, or a constant."""
+        """Return whether the model is refuted: against a stated noise, against a good part of the signal, or a
+        constant.
+        """
         if self.noise_stated:
             return self.systematic or self.explains_nothing
         hardly = not self.white and (self.ratio > 1.0 or self.unresolved) and self.size > _HARDLY * self.signal

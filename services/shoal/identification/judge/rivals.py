@@ -115,7 +115,7 @@ def _downhill(residual: Array, jacobian: Array, damping: float) -> Array:
 
 
 def apart(model: ForwardModel, one: Array, other: Array) -> bool:
-    """Whether two points are different machines; angles that differ by whole turns are not."""
+    """Return whether two points are different machines; angles that differ by whole turns are not."""
     return bool(np.any(differing(model, one, other)))
 
 
@@ -159,7 +159,7 @@ def beside_samples(model: ForwardModel, points: Array, name: str) -> tuple[Array
 
 
 def within(model: ForwardModel, point: Array, parameters: Mapping[str, Value]) -> bool:
-    """Whether intervals that are wide for the mesh's own error, more than for noise, include a point already."""
+    """Return whether intervals that are wide for the mesh's own error, more than for noise, include a point already."""
     if not any(value.correction is not None and abs(value.correction) > value.std for value in parameters.values()):
         return False
     values = zip(model.names, model.parameters.to_values(point), strict=True)
@@ -167,7 +167,7 @@ def within(model: ForwardModel, point: Array, parameters: Mapping[str, Value]) -
 
 
 def same_at_samples(model: ForwardModel, one: Array, other: Array) -> bool:
-    """Whether two motions that fit alike at the samples are apart between them: by whole turns or swings."""
+    """Return whether two motions that fit alike at the samples are apart between them: by whole turns or swings."""
     aside = model.aside()
     for name in model.measurement.recordings:
         at, _, between = beside_samples(aside, np.array([one, other]), name)

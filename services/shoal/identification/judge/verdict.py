@@ -52,7 +52,7 @@ class Verdict(StrEnum):
 
     @property
     def trusted(self) -> bool:
-        """Whether the answer can be used."""
+        """Return whether the answer can be used."""
         return self in (Verdict.IDENTIFIED, Verdict.COMBINATION)
 
 
@@ -184,7 +184,7 @@ def _unfinished(model: ForwardModel, point: Array, seen: Sensitivity) -> str:
 
 
 def _fits_until(model: ForwardModel, point: Array, seen: Sensitivity) -> bool:
-    """Whether the residuals do not refute the model up to where its derivatives can be believed."""
+    """Return whether the residuals do not refute the model up to where its derivatives can be believed."""
     assert seen.end is not None
     part = model.until(seen.end)
     kept = model.rows.time <= seen.end + 1e-12

@@ -157,7 +157,9 @@ def _wide(model: ForwardModel, point: Array) -> npt.NDArray[np.bool_]:
 
 
 def explained(model: ForwardModel, outcome: Outcome) -> bool:
-    """Whether a fit leaves no more than noise, as stated or as the data tell it, or little of what was measured."""
+    """Return whether a fit leaves no more than noise, as stated or as the data tell it, or little of what was
+    measured.
+    """
     rows = len(model.rows.time)
     left = np.sqrt(outcome.fitness * model.rows.samples / rows)
     if model.rows.noise is not None:

@@ -234,7 +234,7 @@ class Search:
 
     @property
     def stuck(self) -> bool:
-        """Whether no step leads down, however short."""
+        """Return whether no step leads down, however short."""
         return self.damping > _LARGE_DAMPING
 
     def ask(self) -> Array | None:

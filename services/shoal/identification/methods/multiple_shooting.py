@@ -290,7 +290,7 @@ def _check(model: ForwardModel) -> None:
 
 
 def _driven(load: Load) -> bool:
-    """Whether a load depends on time."""
+    """Return whether a load depends on time."""
     match load:
         case Torque():
             return load.torque.number is None
@@ -303,7 +303,7 @@ def _driven(load: Load) -> bool:
 
 
 def _rests_at_start(load: object) -> bool:
-    """Whether a load is at rest in the initial pose, which is another one in every segment."""
+    """Return whether a load is at rest in the initial pose, which is another one in every segment."""
     return (isinstance(load, Spring) and load.length is None) or (
         isinstance(load, TorsionSpring) and load.angle is None
     )

@@ -86,7 +86,7 @@ def _first_pose(model: ForwardModel, name: str) -> tuple[Array, Array]:
 
 
 def _at_rest(model: ForwardModel, name: str) -> bool:
-    """Whether the machine starts without any velocity, whatever the parameters are."""
+    """Return whether the machine starts without any velocity, whatever the parameters are."""
     start = model.scene_at(model.parameters.start, name)
     moving = any(body.rate or any(body.velocity or ()) for body in start.initial.values())
     paths = model.parameters.scene_values(model.parameters.start[None], name)

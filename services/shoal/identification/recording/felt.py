@@ -35,7 +35,9 @@ def from_start(times: Array, channels: tuple[Channel, ...]) -> Array:
 
 
 def needs_states(scene: Scene, channels: tuple[Channel, ...]) -> bool:
-    """Whether sensors of some channels feel more than the motion of bodies tells: the machine bends or is in space."""
+    """Return whether sensors of some channels feel more than the motion of bodies tells: the machine bends or is in
+    space.
+    """
     if scene.dimensions == 3:
         return any(channel.is_felt for channel in channels)
     bends = any(body.element != "rigid" for body in scene.bodies.values())

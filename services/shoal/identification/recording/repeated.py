@@ -70,6 +70,6 @@ def _at_once(a: Recording, b: Recording) -> tuple[Samples, Samples]:
 
 
 def _equal(one: Array, other: Array) -> bool:
-    """Whether numbers that change are the same to the last digit, and gaps stand in the same places."""
+    """Return whether numbers that change are the same to the last digit, and gaps stand in the same places."""
     known = np.isfinite(one)
     return bool(np.sum(known) >= _FEWEST and np.array_equal(one, other, equal_nan=True) and np.ptp(one[known]) > 0.0)

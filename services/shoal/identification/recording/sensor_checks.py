@@ -12,7 +12,7 @@ _BENT = ("curvature", "side_curvature", "twist")
 
 
 def check_felt(scene: Scene, channels: tuple[Channel, ...]) -> None:
-    """Whether a machine can carry the sensors of some channels. Raises InputError."""
+    """Return whether a machine can carry the sensors of some channels. Raises InputError."""
     for channel in channels:
         if not channel.is_felt:
             continue
@@ -53,12 +53,12 @@ def _on_a_body(scene: Scene, channel: Channel) -> None:
 
 
 def has_axes(scene: Scene, body: str) -> bool:
-    """Whether a body has axes along which something on it is measured: cables in space have none."""
+    """Return whether a body has axes along which something on it is measured: cables in space have none."""
     return scene.dimensions == 2 or scene.bodies[body].element not in ("ancf-cable", "ancf-quintic")
 
 
 def takes_gauges(scene: Scene, rod: Rod) -> bool:
-    """Whether the strain of a rod is told: of straight ones of elements, in space of director rods."""
+    """Return whether the strain of a rod is told: of straight ones of elements, in space of director rods."""
     told = rod.element == "director-rod" if scene.dimensions == 3 else rod.element not in FRAMED
     return told and not any(getattr(rod, field) for field in _BENT)
 

@@ -144,22 +144,24 @@ class Channel(Record):
 
     @property
     def is_felt(self) -> bool:
-        """Whether a sensor on the machine shows it that knows no camera: of acceleration, force or strain."""
+        """Return whether a sensor on the machine shows it that knows no camera: of acceleration, force or strain."""
         return self.quantity in (*ACCELERATIONS, *RATES, *REACTIONS, STRAIN)
 
     @property
     def is_dynamic(self) -> bool:
-        """Whether it shows accelerations or forces, which depend on the whole machine and not on its motion alone."""
+        """Return whether it shows accelerations or forces, which depend on the whole machine and not on its motion
+        alone.
+        """
         return self.quantity in (*ACCELERATIONS, *REACTIONS)
 
     @property
     def is_pose(self) -> bool:
-        """Whether a pose alone shows it."""
+        """Return whether a pose alone shows it."""
         return self.is_position or self.quantity == "angle"
 
     @property
     def is_position(self) -> bool:
-        """Whether it is a coordinate of a marker, in metres."""
+        """Return whether it is a coordinate of a marker, in metres."""
         return self.quantity in ("x", "y", "z")
 
 

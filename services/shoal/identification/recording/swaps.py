@@ -78,7 +78,7 @@ def _prediction_errors(times: Array, one: Array, other: Array) -> Array:
 
 
 def _cheapest(costs: Array, penalty: float) -> list[int]:
-    """Whether each sample is exchanged against the one before it, for the least sum of costs (Viterbi 1967)."""
+    """Return whether each sample is exchanged against the one before it, for the least sum of costs (Viterbi 1967)."""
     total = (0.0, penalty)
     came_from: list[tuple[int, int]] = []
     for straight, fresh, back, twice in costs.reshape(4, -1).T.tolist():

@@ -117,7 +117,9 @@ def covariance(model: ForwardModel, point: Array, at: Linearisation) -> Array:
 
 
 def few(model: ForwardModel) -> bool:
-    """Whether so little was measured that its noise, which is not stated, cannot be told: then no interval can."""
+    """Return whether so little was measured that its noise, which is not stated, cannot be told: then no interval
+    can.
+    """
     return model.rows.noise is None and len(model.rows.time) < len(model.names) + _FEWEST
 
 
@@ -137,7 +139,7 @@ def _possible(model: ForwardModel, k: int, point: Array, known: Value) -> bool:
 
 
 def _accepted(model: ForwardModel, k: int, point: Array, end: float) -> bool:
-    """Whether a parameter may have a value, beside those of the scene, or else with its ties at the answer."""
+    """Return whether a parameter may have a value, beside those of the scene, or else with its ties at the answer."""
     if model.accepts(model.parameters.paths[k], end):
         return True
     if not model.problem.ties or (model.parameters.logarithmic[k] and end <= 0.0):
@@ -149,7 +151,7 @@ def _accepted(model: ForwardModel, k: int, point: Array, end: float) -> bool:
 
 
 def _own(model: ForwardModel, text: str) -> bool:
-    """Whether an expression has a value for each recording."""
+    """Return whether an expression has a value for each recording."""
     keys = {entry.key for entry in model.parameters.entries.values() if entry.recording is not None}
     return bool(expression.names(text) & keys)
 

@@ -57,7 +57,7 @@ class Foretold:
 
     @property
     def inside(self) -> bool | None:
-        """Whether the error is one that the estimate states; None where it states none."""
+        """Return whether the error is one that the estimate states; None where it states none."""
         return bool(self.rms <= self.limit) if np.isfinite(self.limit) else None
 
     def to_json(self) -> dict[str, Any]:
@@ -86,13 +86,13 @@ class Prediction:
 
     @property
     def inside(self) -> bool | None:
-        """Whether every channel is; None where the estimate states no error."""
+        """Return whether every channel is; None where the estimate states no error."""
         told = [channel.inside for channel in self.channels]
         return None if None in told else all(told)
 
     @property
     def refutes(self) -> bool:
-        """Whether a right model would hardly be so far off."""
+        """Return whether a right model would hardly be so far off."""
         return any(channel.rms > channel.most for channel in self.channels)
 
     @property
@@ -215,7 +215,7 @@ def _of_window(model: ForwardModel, name: str, held: Held) -> ForwardModel:
 
 
 def _hidden(slopes: Array, at: Linearisation) -> bool:
-    """Whether a prediction moves along directions that the data leave open; slopes: of scaled parameters."""
+    """Return whether a prediction moves along directions that the data leave open; slopes: of scaled parameters."""
     if not at.unknown.size:
         return False
     return bool(np.linalg.norm(slopes @ at.unknown) > _HIDDEN * max(float(np.linalg.norm(slopes)), 1e-300))

@@ -56,7 +56,7 @@ class Profile:
 
     @property
     def open(self) -> bool:
-        """Whether the data leave a side open, up to the bound."""
+        """Return whether the data leave a side open, up to the bound."""
         return self.lower_open or self.upper_open
 
     def to_json(self) -> dict[str, Any]:

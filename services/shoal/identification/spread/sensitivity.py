@@ -52,12 +52,12 @@ class Sensitivity:
 
     @property
     def reliable(self) -> bool:
-        """Whether two steps agree in every direction."""
+        """Return whether two steps agree in every direction."""
         return self.doubt <= AGREED
 
     @property
     def possible(self) -> bool:
-        """Whether the point can be simulated at all."""
+        """Return whether the point can be simulated at all."""
         return bool(np.all(np.isfinite(self.residual)))
 
 

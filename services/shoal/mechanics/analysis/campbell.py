@@ -36,7 +36,7 @@ class Campbell:
 
     @property
     def ok(self) -> bool:
-        """Whether modes are known at all speeds; a motion that grows is an answer here."""
+        """Return whether modes are known at all speeds; a motion that grows is an answer here."""
         return self.verdict[0] == "ok"
 
     @property

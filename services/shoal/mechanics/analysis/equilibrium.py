@@ -87,12 +87,12 @@ class Equilibrium:
 
     @property
     def ok(self) -> bool:
-        """Whether this is a stable equilibrium."""
+        """Return whether this is a stable equilibrium."""
         return self.status is Held.OK
 
     @property
     def stable(self) -> bool:
-        """Whether every small displacement is pulled back."""
+        """Return whether every small displacement is pulled back."""
         return self.status is not Held.UNSTABLE and bool(np.all(np.real(self.eigenvalues) > self.levels))
 
     def marker(self, name: str) -> Array:

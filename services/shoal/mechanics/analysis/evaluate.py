@@ -216,7 +216,7 @@ class Evaluator:
 
     @property
     def follows(self) -> bool:
-        """Whether a load turns with a body, or a torque in space does not, so that there is no potential."""
+        """Return whether a load turns with a body, or a torque in space does not, so that there is no potential."""
         applied = self._arrays.applied
         return applied.following + applied.turning + applied.twisting > 0
 

@@ -48,7 +48,7 @@ class FreeMotion:
 
     def slope(self, vector: Affine) -> Array:
         """Return the derivative of a vector by the coordinates, (d, unknowns)."""
-        return points([vector], self.bodies.unknowns).matrix[0]
+        return np.asarray(points([vector], self.bodies.unknowns).matrix[0])
 
     def place(self, side: Attachment) -> Array:
         """Return the position of an attachment [m], (samples, d)."""
@@ -198,4 +198,4 @@ def _unit(vectors: Array) -> Array:
 
 def _square(vectors: Array) -> Array:
     """Return their squared lengths, (samples, 1, 1)."""
-    return np.sum(vectors**2, axis=1)[:, None, None]
+    return np.asarray(np.sum(vectors**2, axis=1)[:, None, None])

@@ -35,7 +35,7 @@ class Component(NamedTuple):
 
     @property
     def turns(self) -> bool:
-        """Whether it is a torque alone."""
+        """Return whether it is a torque alone."""
         return bool(np.any(self.torque) and not np.any(self.force))
 
     def times(self, factor: Array) -> Component:
@@ -142,7 +142,7 @@ class Displacements(NamedTuple):
 
     def work(self, force: Array) -> Array:
         """Return the work of generalised forces, (samples, unknowns of all), in each displacement."""
-        return np.einsum("nku,nu->nk", self.matrix, force[:, self.unknowns])
+        return np.asarray(np.einsum("nku,nu->nk", self.matrix, force[:, self.unknowns]))
 
 
 def displacements(motion: FreeMotion, lever: float) -> list[Displacements]:

@@ -78,7 +78,7 @@ class Reactions:
 
     @property
     def ok(self) -> bool:
-        """Whether all bodies are balanced, by forces that do not depend on the steps."""
+        """Return whether all bodies are balanced, by forces that do not depend on the steps."""
         return self.status == "ok"
 
     @property

@@ -142,7 +142,7 @@ class Modes:
 
     @property
     def ok(self) -> bool:
-        """Whether the modes may be believed, and none grows."""
+        """Return whether the modes may be believed, and none grows."""
         return self.verdict[0] == "ok"
 
     @property

@@ -97,7 +97,7 @@ def pull(scene: Scene) -> float:
 
 
 def hides(levels: Array | float, values: Array, least: float) -> bool:
-    """Whether round-off may hide a motion that matters among those that nothing seems to hold.
+    """Return whether round-off may hide a motion that matters among those that nothing seems to hold.
 
     levels: of those, values: of all, least: of what is told else, such as `pull`; squared, all [rad^2/s^2]
     """

@@ -280,7 +280,7 @@ class _Search:
         return Found(q, True, self.iterations, correction)
 
     def _firm(self, q: Array, load: float) -> bool:
-        """Whether the reduced stiffness pulls every displacement back."""
+        """Return whether the reduced stiffness pulls every displacement back."""
         if self.evaluator.follows and load > 0:
             return True
         found = self.balance.spectrum(q, self.balance.look(q, load), load)

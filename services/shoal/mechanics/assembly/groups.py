@@ -35,7 +35,7 @@ class JointPoint:
         return next(p for owner, p in self.places if owner == body)
 
     def touches(self, body: str) -> bool:
-        """Whether a body has this place."""
+        """Return whether a body has this place."""
         return any(owner == body for owner, _ in self.places)
 
 
@@ -175,5 +175,5 @@ def start_angle(scene: Scene, side: Attachment) -> Number:
 
 
 def is_stiff(scene: Scene, body: str) -> bool:
-    """Whether a body is the ground or rigid."""
+    """Return whether a body is the ground or rigid."""
     return body == GROUND or scene.bodies[body].element == "rigid"

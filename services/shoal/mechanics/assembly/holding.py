@@ -71,7 +71,7 @@ def _keep_mesh(scene: Scene, name: str, condition: Geared, result: Placement) ->
 
 
 def _is_clamp(scene: Scene, weld: Turned, result: Placement) -> bool:
-    """Whether the weld is to the ground at a node, where the slope has one unknown only."""
+    """Return whether the weld is to the ground at a node, where the slope has one unknown only."""
     sides = {side.body: side for side in (weld.first, weld.second)}
     if GROUND not in sides:
         return False

@@ -232,5 +232,5 @@ def _add(entries: Entries, vectors: list[Affine], matrix: list[list[Number]]) ->
 
 
 def _vanishes(value: Number) -> bool:
-    """Whether a number is zero, in all lanes."""
+    """Return whether a number is zero, in all lanes."""
     return not value if isinstance(value, float) else not np.any(value)

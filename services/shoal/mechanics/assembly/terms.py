@@ -49,7 +49,7 @@ class Term:
         return [(x[i], y[j], form[i, j], u, w) for i, j in zip(*np.nonzero(form), strict=True)]
 
     def is_constant(self, size: float) -> bool:
-        """Whether every product of unknowns counts by round-off only. size: a length of the machine [m]."""
+        """Return whether every product of unknowns counts by round-off only. size: a length of the machine [m]."""
         small = ROUND_OFF * min(size**self.lengths, size ** (self.lengths - 1))
         one, other = ({CONSTANT: vector.constant, **vector.terms} for vector in (self.u, self.w))
         found: dict[frozenset[int], Number] = {}

@@ -247,7 +247,7 @@ def _first_of(family: Family, one: int, other: int) -> int:
 
 @njit(error_model="numpy", forceinline=True)
 def _is_of(family: Family, number: int, one: int, other: int) -> bool:
-    """Whether an element is of one variant or another."""
+    """Return whether an element is of one variant or another."""
     return family.plan[PLAN * number + VARIANT] in (one, other)
 
 

@@ -123,7 +123,7 @@ def add_mean_force(tile: Tile, family: Family, before: Array, after: Array, f: A
 
 
 def is_exact(family: Family) -> bool:
-    """Whether `add_mean_force` does anything."""
+    """Return whether `add_mean_force` does anything."""
     raise NotImplementedError(type(family).__name__)
 
 

@@ -82,12 +82,12 @@ def restart(scheme: Any) -> None:
 
 
 def adaptive(scheme: Any) -> bool:
-    """Whether the scheme chooses its steps itself."""
+    """Return whether the scheme chooses its steps itself."""
     raise NotImplementedError(type(scheme).__name__)
 
 
 def averages(scheme: Any) -> bool:
-    """Whether the scheme leaves the mean power of its step in w.power."""
+    """Return whether the scheme leaves the mean power of its step in w.power."""
     raise NotImplementedError(type(scheme).__name__)
 
 

@@ -129,7 +129,7 @@ def _turn(tile: Tile, m: Arrays, w: GaussWork, v: Array) -> bool:
 
 @njit(cache=True, error_model="numpy")
 def _are_redundant(tile: Tile, m: Arrays, w: GaussWork, v: Array, lane: int, rank: int) -> bool:
-    """Whether the rows of a group beyond a rank add nothing by third derivatives; dC_q/dt is in w.
+    """Return whether the rows of a group beyond a rank add nothing by third derivatives; dC_q/dt is in w.
 
     At rest those vanish and say nothing.
     """

@@ -130,7 +130,7 @@ def orthonormalise(w: GroupWork, count: int, n: int, width: int, lane: int, give
 
 @njit(error_model="numpy", forceinline=True)
 def _are_gone(w: GroupWork, rank: int, count: int, tolerance: float) -> bool:
-    """Whether nothing is left of the rows beyond a rank in any lane."""
+    """Return whether nothing is left of the rows beyond a rank in any lane."""
     most = spread(EIGHT, 0.0)
     for j in range(rank, count):
         most = larger(most, load(EIGHT, w.left, w.order[j] * len(EIGHT)))
@@ -179,7 +179,7 @@ def third_derivative(
 
 @njit(cache=True, error_model="numpy")
 def depends(w: GroupWork, rank: int, n: int, width: int, lane: int, row: Array, tolerance: float) -> bool:
-    """Whether a row, (unknowns, width), depends on the basis in all lanes, as in `projection.extend`."""
+    """Return whether a row, (unknowns, width), depends on the basis in all lanes, as in `projection.extend`."""
     e, square = len(EIGHT), spread(EIGHT, 0.0)
     for i in range(n):
         value = load(EIGHT, row, i * width + lane)

@@ -73,7 +73,7 @@ def _choose(tile, space):  # type: ignore[no-untyped-def]
 
 
 def _divides(space: tuple[int, ...]) -> bool:
-    """Whether vectors of the processor hold whole vectors of the space."""
+    """Return whether vectors of the processor hold whole vectors of the space."""
     return len(EIGHT) % len(space) == 0
 
 

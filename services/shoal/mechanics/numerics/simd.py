@@ -160,7 +160,7 @@ def root(typing_context, x):  # type: ignore[no-untyped-def]
 
 
 def _knows_digits(context: Any, count: int) -> bool:
-    """Whether the processor has AVX-512, for vectors of this length."""
+    """Return whether the processor has AVX-512, for vectors of this length."""
     return count == len(EIGHT) and "+avx512f" in context.codegen().magic_tuple()[2].split(",")
 
 

@@ -73,7 +73,7 @@ def packed(structure: Any, lanes: slice, tile: Tile) -> Any:
 
 
 def varies(structure: Any) -> bool:
-    """Whether any number of a structure depends on the lane."""
+    """Return whether any number of a structure depends on the lane."""
     if isinstance(structure, np.ndarray):
         return structure.ndim == 2 and structure.shape[1] > 1
     return isinstance(structure, tuple) and any(varies(part) for part in structure)

@@ -132,7 +132,7 @@ class Assembly:
         return self._sought[asked]
 
     def closes(self, chosen: list[Statement], joints: Sequence[str]) -> bool:
-        """Whether these joints of one machine close with these statements held: a few guesses, all at once."""
+        """Return whether these joints of one machine close with these statements held: a few guesses, all at once."""
         fixed, values = self.held(chosen)
         begin = np.concatenate([self._guess(number, fixed[:, 2::3]) for number in range(FEWER)])
         for own in (True, False) if self._own else (True,):
@@ -183,7 +183,7 @@ class Assembly:
 
     @property
     def _own(self) -> bool:
-        """Whether joints keep what the start gives them."""
+        """Return whether joints keep what the start gives them."""
         return any(
             (isinstance(one, Turned) and one.is_of_start)
             or (isinstance(one, Apart) and one.length is None)
@@ -276,7 +276,7 @@ class Assembly:
         return np.where(better[:, None], found, u), np.where(better[:, None], more, kept)
 
     def _free(self, one: Statement, u: Array, kept: Flags) -> Flags:
-        """Whether the joints and what is kept leave the columns of a statement free, (lanes, columns)."""
+        """Return whether the joints and what is kept leave the columns of a statement free, (lanes, columns)."""
         slope = Closure(self.scene, u, own=False).rows(u).slope * np.sqrt(np.where(kept, 0.0, self.give))[:, None, :]
         basis = np.linalg.svd(slope, full_matrices=False)
         rank = DEPENDENT * np.max(basis.S, axis=1, initial=1e-300, keepdims=True) < basis.S

@@ -94,7 +94,7 @@ class Velocities:
         return Moving(rates, ok & branch, broken)
 
     def _easy(self) -> bool:
-        """Whether the first guess is right: at rest, or too large a machine to look for branches."""
+        """Return whether the first guess is right: at rest, or too large a machine to look for branches."""
         missed = self.rows.along(self.guess) + self.rows.rate
         wrong = [self.guess[:, one.columns] - one.values for one in self.statements]
         if max(float(np.max(np.abs(part), initial=0.0)) for part in (missed, *wrong)) > 1e-13 * self.speed:

@@ -93,7 +93,7 @@ def complete(scene: Scene) -> Start:
 
 
 def gives_numbers(scene: Scene) -> bool:
-    """Whether joints or loads take a number of theirs (an angle, a length, a side) from the start.
+    """Return whether joints or loads take a number of theirs (an angle, a length, a side) from the start.
 
     In space they take their axes from it.
     """
@@ -101,7 +101,7 @@ def gives_numbers(scene: Scene) -> bool:
 
 
 def is_direct(scene: Scene) -> bool:
-    """Whether the walk along the joints keeps every statement: open chains of revolute joints in the plane."""
+    """Return whether the walk along the joints keeps every statement: open chains of revolute joints in the plane."""
     if scene.ground_points or scene.dimensions == 3 or any(start.mode_rates for start in scene.initial.values()):
         return False
     group = {name: name for name in (GROUND, *scene.bodies)}

@@ -10,7 +10,9 @@ from shoal.scene import FRAMED, Scene, Weld
 
 
 def gives_way(scene: Scene) -> bool:
-    """Whether a machine starts with elastic rods strained, so that their joints need not close without strain."""
+    """Return whether a machine starts with elastic rods strained, so that their joints need not close without
+    strain.
+    """
     elastic = any(body.element not in FRAMED for body in scene.bodies.values())
     return scene.initial_from is not None and elastic
 

@@ -56,7 +56,9 @@ def watched(machine: Machine, limit: Limit) -> Machine:
 
 
 def require(machine: Machine, limit: Limit, inputs: Inputs) -> None:
-    """Whether the machine tells a limit, by a run in the middle, as a balance of forces does. Raises InputError."""
+    """Return whether the machine tells a limit, by a run in the middle, as a balance of forces does. Raises
+    InputError.
+    """
     if limit.is_dynamic:
         middle = inputs.values(inputs.germs(np.full((1, len(inputs)), 0.5)))
         watched(replace(machine, keep=None), limit)(middle)
@@ -119,7 +121,7 @@ def judge(
 
 
 def _decided(attained: Array, outer: Array) -> bool | None:
-    """Whether a limit is kept by margins over time: those that a run attains, and those that any may have."""
+    """Return whether a limit is kept by margins over time: those that a run attains, and those that any may have."""
     return False if attained.min() < 0 else True if outer.min() >= 0 else None
 
 

@@ -112,7 +112,9 @@ class Between:
 
 
 def undecided(beyond: float) -> str:
-    """Whether so much of a reliability index is too much for interval values that were not looked at, in words."""
+    """Return whether so much of a reliability index is too much for interval values that were not looked at, in
+    words.
+    """
     if beyond <= MOST_BEYOND:
         return ""
     return f"the interval values that decide are not known: others may change beta by {beyond:.2g}"

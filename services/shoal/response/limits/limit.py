@@ -42,7 +42,7 @@ class Limit:
 
     @property
     def is_required(self) -> bool:
-        """Whether the text is what must hold, not what must not happen."""
+        """Return whether the text is what must hold, not what must not happen."""
         return self.stated == "requirement"
 
     @property
@@ -84,7 +84,7 @@ class Limit:
 
     @property
     def is_dynamic(self) -> bool:
-        """Whether masses and loads tell it, not the motion of a marker alone."""
+        """Return whether masses and loads tell it, not the motion of a marker alone."""
         return self.quantity not in {**MARKERS[2], **MARKERS[3]}
 
     def scene(self, scene: Scene) -> Scene:

@@ -23,7 +23,7 @@ class MarginErrors:
 
     @property
     def unknown(self) -> bool:
-        """Whether they were looked for, and one could not be estimated."""
+        """Return whether they were looked for, and one could not be estimated."""
         return bool(self.budget.unknown)
 
 

@@ -39,12 +39,12 @@ _BENT = ("curvature", "side_curvature", "twist")
 
 
 def of_section(quantity: str, scene: Scene) -> bool:
-    """Whether a section of a flexible rod tells it."""
+    """Return whether a section of a flexible rod tells it."""
     return quantity in STRAINS or quantity in SECTIONS[scene.dimensions]
 
 
 def needs_states(quantity: str, scene: Scene) -> bool:
-    """Whether more tells it than the motion of the bodies of a rigid machine in the plane."""
+    """Return whether more tells it than the motion of the bodies of a rigid machine in the plane."""
     if of_section(quantity, scene):
         return True
     dynamic = quantity in ENERGIES or quantity in REACTIONS[scene.dimensions]
@@ -52,7 +52,7 @@ def needs_states(quantity: str, scene: Scene) -> bool:
 
 
 def check(place: str, quantity: str, scene: Scene) -> None:
-    """Whether a machine tells it of a marker, a joint or, where place is empty, itself. Raises InputError."""
+    """Return whether a machine tells it of a marker, a joint or, where place is empty, itself. Raises InputError."""
     d = scene.dimensions
     if quantity in ENERGIES:
         if place:
@@ -85,7 +85,7 @@ def check(place: str, quantity: str, scene: Scene) -> None:
 
 
 def _check_rod(scene: Scene, marker: str, quantity: str) -> None:
-    """Whether a marker lies on a rod that tells its section forces or its strain. Raises InputError."""
+    """Return whether a marker lies on a rod that tells its section forces or its strain. Raises InputError."""
     name = scene.markers[marker].body
     rod = scene.bodies.get(name)
     if not isinstance(rod, Rod) or rod.element == "rigid":

@@ -118,7 +118,7 @@ def _next(plan: Screened, degree: int) -> int:
 
 
 def _carried(plan: Screened, degree: int) -> bool:
-    """Whether the good runs there are carry that degree."""
+    """Return whether the good runs there are carry that degree."""
     return len(plan.study.runs.germs) >= SHARE * plan.size(degree)
 
 
@@ -254,7 +254,7 @@ def _enough(plan: Screened) -> float:
 
 
 def _late(plan: Screened) -> bool:
-    """Whether enough runs are made to look for the horizon."""
+    """Return whether enough runs are made to look for the horizon."""
     return plan.study.runs.own >= ENOUGH * plan.fair
 
 

@@ -122,7 +122,7 @@ def _share(study: Study, error: Array) -> float:
 
 
 def _carried(parameters: int, degree: int, runs: int) -> bool:
-    """Whether so many runs carry that degree."""
+    """Return whether so many runs carry that degree."""
     return runs >= (1 if parameters == 1 else SHARE) * size(parameters, degree)
 
 

@@ -31,11 +31,11 @@ class SpatialEnds(Ends):
         return part, tuple(float(x) for x in self.scene.location(at))
 
     def is_cable(self, at: Attachment) -> bool:
-        """Whether an attachment is on a flexible rod."""
+        """Return whether an attachment is on a flexible rod."""
         return isinstance(self.part(at)[0], SpatialCablePart)
 
     def is_ground(self, at: Attachment) -> bool:
-        """Whether it rests."""
+        """Return whether it rests."""
         return isinstance(self.part(at)[0], SpatialGround)
 
     def side(self, at: Attachment) -> Side:

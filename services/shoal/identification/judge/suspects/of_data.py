@@ -102,7 +102,7 @@ def _files_exchanged(model: ForwardModel, one: str, other: str) -> ForwardModel 
 
 
 def _of_a_kind(one: Channel, other: Channel) -> bool:
-    """Whether columns may have been taken for each other: of one unit, and of one place or one quantity."""
+    """Return whether columns may have been taken for each other: of one unit, and of one place or one quantity."""
     alike = one.place == other.place or one.quantity == other.quantity
     return alike and units_of(one.quantity) == units_of(other.quantity)
 

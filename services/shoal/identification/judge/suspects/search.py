@@ -238,7 +238,9 @@ class _Search:
 
     @property
     def _explained(self) -> bool:
-        """Whether the best explanation leaves no more than noise, of what was so large that another would not."""
+        """Return whether the best explanation leaves no more than noise, of what was so large that another would
+        not.
+        """
         return self._least <= _WHOLLY * self.noise and self.before > _SMALL * self.noise
 
     def _scored(self, together: Together) -> list[_Scored]:
@@ -369,7 +371,7 @@ class _Search:
                 self.found.append(_of_reading(reading, self.before, after, of_channels(self.model.measurement)))
 
     def _look_back(self) -> None:
-        """Whether the refits met a better minimum: what was freed goes back to its stated value."""
+        """Return whether the refits met a better minimum: what was freed goes back to its stated value."""
         promising = [end for after, end in sorted(self.ends, key=lambda end: end[0])[:2] if after < self.before]
         if not promising:
             return

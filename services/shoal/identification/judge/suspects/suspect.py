@@ -48,7 +48,9 @@ class Suspect:
         return self.after**2 * penalty(self.numbers, rows)
 
     def equals(self, best: Suspect, rows: int) -> bool:
-        """Whether so many rows cannot tell it from the best one, which has no more numbers: alike within chance."""
+        """Return whether so many rows cannot tell it from the best one, which has no more numbers: alike within
+        chance.
+        """
         alike = self.after**2 <= best.after**2 * max(1.0 + _CHANCE / rows, 1.02)
         return alike and self.numbers <= best.numbers
 

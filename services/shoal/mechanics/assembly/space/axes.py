@@ -35,7 +35,7 @@ class JointAxis:
         return next(image for owner, image in self.images if owner == body)
 
     def touches(self, body: Owner) -> bool:
-        """Whether a body has this axis."""
+        """Return whether a body has this axis."""
         return any(owner == body for owner, _ in self.images)
 
 
@@ -60,7 +60,7 @@ def joint_axes(scene: Scene, attitudes: Attitudes, elements: dict[str, Element])
 
 
 def _opposed(attitudes: Attitudes, first: str, second: str) -> bool:
-    """Whether the x axes of two bodies point away from each other at the start."""
+    """Return whether the x axes of two bodies point away from each other at the start."""
     one, other = (attitudes.rotation(body)[:, 0, 0] for body in (first, second))
     return bool(one @ other < 0)
 

@@ -73,7 +73,7 @@ def turning(
 
 
 def _has_section(scene: Scene, result: SpatialPlacement, side: Attachment) -> bool:
-    """Whether a body has directions across any axis at a place: a rigid one, or a director rod at a node."""
+    """Return whether a body has directions across any axis at a place: a rigid one, or a director rod at a node."""
     frame = result.frames.get(side.body)
     if not isinstance(frame, BeamFrame):
         return is_stiff(scene, side.body)

@@ -121,7 +121,7 @@ def _keep_mesh(name: str, condition: Geared, result: SpatialPlacement) -> None:
 
 
 def rests(vector: Affine) -> bool:
-    """Whether a vector depends on the coordinates by no more than round-off."""
+    """Return whether a vector depends on the coordinates by no more than round-off."""
     return all(np.max(np.abs(coefficient)) <= 1e-12 for coefficient in vector.terms.values())
 
 

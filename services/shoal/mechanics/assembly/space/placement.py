@@ -262,7 +262,7 @@ class _Chosen:
 
 
 def _independent(image: Array, chosen: list[_Chosen]) -> bool:
-    """Whether a vector is far enough from the span of those chosen, which are fewer than three."""
+    """Return whether a vector is far enough from the span of those chosen, which are fewer than three."""
     size = np.sqrt(np.sum(image**2, axis=0))
     if len(chosen) == 3 or np.any(size == 0.0):
         return False
@@ -278,7 +278,9 @@ def _independent(image: Array, chosen: list[_Chosen]) -> bool:
 
 
 def _is_kept(one: _Chosen, other: _Chosen) -> bool:
-    """Whether a product of axes is kept already: their length by who made them, their angle by a body that has both."""
+    """Return whether a product of axes is kept already: their length by who made them, their angle by a body that has
+    both.
+    """
     if one.axis is None or other.axis is None:
         return False
     return one.axis is other.axis or bool(one.axis.holders & other.axis.holders)

@@ -138,7 +138,7 @@ def _go_on(scene: Scene, name: str, condition: Aligned | Turned, result: Spatial
 
 
 def _keep_products(scene: Scene, name: str, weld: Turned, relative: Array, result: SpatialPlacement) -> bool:
-    """Whether products of slopes and directors keep two sections as they are turned; if so, they are held.
+    """Return whether products of slopes and directors keep two sections as they are turned; if so, they are held.
 
     A product a . b of directions of both keeps the rotation about a x b.
     """

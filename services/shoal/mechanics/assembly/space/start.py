@@ -95,7 +95,7 @@ def _guesses(stated: list[_Stated]) -> Iterator[list[_Stated]]:
 
 
 def _leaves_free(held: Array, asked: Array) -> bool:
-    """Whether some row of those asked for changes while those that are held do not."""
+    """Return whether some row of those asked for changes while those that are held do not."""
     _, sizes, rows = np.linalg.svd(held, full_matrices=False)
     told = rows[: int(np.sum(sizes > DEPENDENT * sizes[:1]))]
     left = asked - (asked @ told.T) @ told
@@ -159,7 +159,7 @@ class _Closing:
         return np.stack([np.broadcast_to(one, lanes) for one in found]) if found else np.zeros((0, lanes))
 
     def _keeps(self, lane: int) -> bool:
-        """Whether the poses are those that are stated."""
+        """Return whether the poses are those that are stated."""
         away = (abs(one.off(self.q[:, lane])) for one in self._rows(_POSES, lane))
         return all(off <= CLOSED * max(self.size, 1.0) for off in away)
 
@@ -263,7 +263,7 @@ class _Closing:
         return None
 
     def _flipped(self, q: Array, lane: int) -> bool:
-        """Whether a body has become its own mirror image."""
+        """Return whether a body has become its own mirror image."""
         for frame in self.placement.frames.values():
             if isinstance(frame, RigidFrame):
                 directors = np.array([at(one, q, lane) for one in frame.directors])
@@ -312,7 +312,7 @@ class _Closing:
         return _Rates(terms, scale, driven, stated, max(1.0, float(np.max(np.abs(self.v[:, lane]), initial=0.0))))
 
     def _moves(self, lane: int, wanted: _Rates) -> bool:
-        """Whether the rates meet the constraints and what is stated, guesses among it."""
+        """Return whether the rates meet the constraints and what is stated, guesses among it."""
         (terms, scale, driven, _, pace), v = wanted, self.v[:, lane]
         kept = all(abs(one.off(v)) <= CLOSED * pace for one in self._rows(_RATES, lane))
         kept = kept and all(np.all(np.abs(rows @ v) <= CLOSED * pace) for rows in self._straining(lane))
@@ -375,7 +375,9 @@ class _Closing:
         return True
 
     def _kept(self, stated: list[_Stated], v: Array, pace: float) -> bool:
-        """Whether rates are the stated ones but for rounding. Raises InputError of a single scene if they are not."""
+        """Return whether rates are the stated ones but for rounding. Raises InputError of a single scene if they are
+        not.
+        """
         off = [abs(one.off(v)) for one in stated]
         if max(off, default=0.0) <= ROUNDING * pace:
             return True
