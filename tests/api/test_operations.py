@@ -44,7 +44,7 @@ CALLS: dict[str, tuple[tuple[Any, ...], dict[str, Any]]] = {
     "design": (("paper-case-1",), {"about": "start", "noise": 1e-3}),
 }
 ERRORS: dict[str, tuple[str, ...]] = {
-    "simulate": ("model", "errors", "total"),
+    "simulate": ("errors", "total"),
     "select": ("selection", "errors", "total"),
     "sweep": ("error",),
     "uncertain": ("error",),

@@ -92,7 +92,7 @@ def test_flexible_double_pendulum(name: str, quadrature: str, expected: tuple[fl
     run = ENGINE.simulate(_flexible(name, quadrature=quadrature))
     assert run.ok, run.message
     assert run.energy_drift[0] < 1e-12
-    assert run.points.shape == (50, 2, 2, 1)
+    assert run.points.shape == (51, 2, 2, 1)
     assert run.model["unknowns"] == 28
     np.testing.assert_allclose(run.marker("B")[-1], expected, atol=2e-10)
 

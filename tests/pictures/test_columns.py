@@ -47,7 +47,7 @@ def test_a_motion_as_netcdf(tmp_path: Path) -> None:
     xarray = pytest.importorskip("xarray")
     answer = written(tmp_path / "motion.nc")
     with xarray.open_dataset(tmp_path / "motion.nc") as data:
-        assert dict(data.sizes) == {"time": 5, "marker": 1}
+        assert dict(data.sizes) == {"time": 6, "marker": 1}
         assert np.array_equal(data["x"].sel(marker="A"), answer["markers"]["A"]["x"])
         assert {name: data[name].units for name in ("time", "x", "angle")} == {"time": "s", "x": "m", "angle": "rad"}
         assert data.attrs["scene"] == "single-pendulum"

@@ -27,7 +27,7 @@ def check_scene(scene: Scene, settings: Settings, times: Sequence[float] | None 
     elements = _elements(scene)
     if elements > settings.max_elements:
         raise TooMuch(f"scene.bodies: {elements} elements; this service computes {settings.max_elements}")
-    samples = solver.samples if times is None else len(times)
+    samples = solver.samples + 1 if times is None else len(times)
     values = samples * len(scene.markers) * lanes
     if values > settings.max_values:
         size = f"{samples} samples of {len(scene.markers)} markers in {lanes} lanes"

@@ -64,9 +64,12 @@ class Engine(Protocol):
 
 
 def sampling_times(scene: Scene, times: Sequence[float] | Array | None) -> Array:
-    """Requested instants [s] as an increasing array of its own, or the scene's own. Raises InputError."""
+    """Return the requested instants [s] as an increasing array of its own, else the scene's, from 0 on.
+
+    Raises InputError.
+    """
     if times is None:
-        return np.linspace(0.0, scene.solver.duration, scene.solver.samples + 1)[1:]
+        return np.linspace(0.0, scene.solver.duration, scene.solver.samples + 1)
     wanted = numbers("times", times, "times in s")
     if wanted[0] < 0:
         raise InputError(f"times: must start at or after 0 s, found {wanted[0]:g}")

@@ -11,6 +11,7 @@ those of other engines' are local.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import partial
@@ -351,7 +352,7 @@ def _time_deviation(
     if not chaotic and run.steps <= FEWER * trajectory.steps:
         # Round-off that singular positions magnify is no matter of the tolerance.
         singular = trajectory.model.get("passes_singular", False)
-        return found if singular else replace(found, factor=1.0 / (np.sqrt(SPAN) - 1.0)), ""
+        return found if singular else replace(found, factor=1.0 / (math.sqrt(SPAN) - 1.0)), ""
     # A chaotic motion may be lost to the looser run and not yet to this one, and one whose steps end for other
     # reasons than its tolerance has the same ones in both: a tighter one with shorter steps tells.
     tighter, note = second("time", lambda: _careful(scene, trajectory, TIGHTER), 1)

@@ -118,7 +118,9 @@ def uncertain(
     inputs = Inputs(parameters(vary, wanted), correlations)
     starts = Tally(Stated.of(wanted, [path for one in inputs.parameters for path in one.factors]))
     get_way(limit_method)
-    when, asked = sampling_times(wanted, times), read_limits(limits, requirements, wanted)
+    # The start is stated, not a response: of the scene's own instants those after it count.
+    when = sampling_times(wanted, times) if times is not None else sampling_times(wanted, None)[1:]
+    asked = read_limits(limits, requirements, wanted)
     if allocate and len(asked) != 1:
         raise InputError(f"allocate: needs one limit, found {len(asked)}; state it with --require or --limit")
     costs_of(costs or {}, inputs)

@@ -26,8 +26,8 @@ IntegratorName = Literal[
 class Solver(Record):
     """How the motion is computed.
 
-    `duration` and `step` are in s; `samples` output times are spread evenly over the duration, the
-    first one sampling interval after the start. `integrator: auto` picks by the stiffness of the scene.
+    `duration` and `step` are in s; the motion is reported at its start and at `samples` evenly spread times
+    after it. `integrator: auto` picks by the stiffness of the scene.
     Adaptive integrators (dop853, radau5) keep the error of each step below `absolute_tolerance` +
     `relative_tolerance` times the size of the state; `step` is then their first step, `max_step` [s] the
     longest (no limit if null: a machine at rest may then skip what a drive does later), and `max_steps` the most

@@ -157,7 +157,7 @@ mbs.SetPostStepUserFunction(record)"""
 _TABLE = """
 if not done:
     sys.exit(f"Exudyn's solver gave up at {{times[-1]:g}} s")
-wanted = np.linspace(0.0, {duration}, {samples})[1:]
+wanted = np.linspace(0.0, {duration}, {samples})
 table = sampled(wanted, np.array(times), *(np.array(of).reshape(len(times), -1) for of in (places, speeds)))
 columns = [f"{{name}}.{{axis}}" for name in markers for axis in "{axes}"]
 table = np.column_stack([wanted, table.reshape(len(wanted), -1, 3)[:, :, :{count}].reshape(len(wanted), -1)])
