@@ -48,10 +48,13 @@ def test_site_builds_without_a_warning_and_names_no_address_to_load(tmp_path: Pa
     assert "shoal identify" in (tmp_path / "reference" / "commands.html").read_text(encoding="utf-8")
 
 
-def test_every_file_that_the_readme_names_is_there() -> None:
-    links = re.findall(r"\]\(([^):]+)\)", (DOCS.parent / "README.md").read_text(encoding="utf-8"))
+def test_every_file_and_heading_that_the_readme_names_is_there() -> None:
+    links = re.findall(r"\]\(([^):#]+)(?:#([^)]+))?\)", (DOCS.parent / "README.md").read_text(encoding="utf-8"))
     assert len(links) > 10
-    assert [link for link in links if not (DOCS.parent / link).exists()] == []
+    assert [file for file, _ in links if not (DOCS.parent / file).exists()] == []
+    for file, heading in links:
+        titles = re.findall(r"^#+ (.+)$", (DOCS.parent / file).read_text(encoding="utf-8"), re.M) if heading else []
+        assert not heading or heading in [re.sub(r"\W+", "-", title.lower()) for title in titles], (file, heading)
 
 
 def test_notebook_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
