@@ -350,9 +350,9 @@ def _time_deviation(
     away = _apart(trajectory, run)
     chaotic = bool(np.any(away > WRONG * np.array([scale, 1.0])))
     if not chaotic and run.steps <= FEWER * trajectory.steps:
-        # Round-off that singular positions magnify is no matter of the tolerance.
-        singular = trajectory.model.get("passes_singular", False)
-        return found if singular else replace(found, factor=1.0 / (math.sqrt(SPAN) - 1.0)), ""
+        # Round-off that closed loops magnify near singular positions is no matter of the tolerance.
+        loops = len(scene.joints) > len(scene.bodies)
+        return found if loops else replace(found, factor=1.0 / (math.sqrt(SPAN) - 1.0)), ""
     # A chaotic motion may be lost to the looser run and not yet to this one, and one whose steps end for other
     # reasons than its tolerance has the same ones in both: a tighter one with shorter steps tells.
     tighter, note = second("time", lambda: _careful(scene, trajectory, TIGHTER), 1)
