@@ -339,7 +339,8 @@ def test_no_limit_is_called_kept_that_the_true_machine_passes(seed: int) -> None
         for away in rng.normal(0.0, 1.0, 2) * rng.choice([0.1, 1.0, 10.0]) * width:
             limits.append(f"e.{axis} > {float(most + away)!r}")
             beyond.append(-float(away))
-    found = shoal.uncertain(scene, {"initial.r.angle": (begin - half, begin + half)}, limits=limits)
+    end = [scene.solver.duration]
+    found = shoal.uncertain(scene, {"initial.r.angle": (begin - half, begin + half)}, times=end, limits=limits)
     assert found.bounds is not None
     for k, axis in enumerate("xy"):
         low, high = (found.column("e", axis, of)[-1] for of in (found.bounds.lower_outer, found.bounds.upper_outer))

@@ -201,6 +201,8 @@ def _without_preamble(data: bytes) -> bytes:
     its own for each column. A first line that has one too stays the header: two of them are ambiguous.
     """
     lines = data.split(b"\n")
+    if any(line.count(mark) >= _MOST_COLUMNS for line in lines[:_LOOKED] for mark in (b",", b";", b"\t")):
+        return data  # refused by its number of columns
     cells = [_cells(line) for line in _tabbed(b"\n".join(lines[:_LOOKED])).split(b"\n")]
     told = [k for k, line in enumerate(cells) if line]
     rows = [_are_numbers(cells[k]) and len(cells[k]) > 1 for k in told]

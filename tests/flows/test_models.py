@@ -115,7 +115,7 @@ def test_champion_computes_what_shoal_simulates(fits: list[Fit], tmp_path: Path)
 def test_page_of_the_documentation_loads_the_champion(fits: list[Fit], capsys: pytest.CaptureFixture[str]) -> None:
     assert registered(fits[0], "paper-case-1").aliases == ["champion"]
     page = (Path(__file__).parents[2] / "docs" / "dashboard.md").read_text(encoding="utf-8")
-    (code,) = re.findall(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
+    (code,) = re.findall(r"^```python[^\n]*\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
     exec(compile(code, "dashboard.md", "exec"), {})
     assert "B.x [m]" in capsys.readouterr().out
 

@@ -109,7 +109,7 @@ def test_a_spring_that_was_left_out_is_a_suspect(spring: float) -> None:
 def test_a_search_for_the_cause_that_is_cut_ends_the_trust(monkeypatch: pytest.MonkeyPatch) -> None:
     """What it would have found would have widened the intervals."""
 
-    def late(_: Any) -> None:
+    def late(*_: Any) -> None:
         raise TimeIsUp
 
     monkeypatch.setattr(search._Search, "run", late)

@@ -91,5 +91,5 @@ def test_a_limit_that_is_stated_the_other_way_round_is_noted() -> None:
         uncertain(Scene.parse(BALL), ["initial.b.velocity.0~normal(1,0.01)"], [1.0], limits=[text], verify=False)
         for text in ("b.x > 0.5", "b.x > 1.01")
     )
-    assert "what is required instead" in noted.limits[0].note
+    assert "is it required (--require)?" in noted.limits[0].note
     assert plain.limits[0].note == ""

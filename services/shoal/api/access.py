@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import json
 import logging
+import time
 from collections.abc import Sequence
 from datetime import UTC, datetime
-from time import perf_counter
 
 from shoal.api.guard import Application, Message, Receive, Scope, Send
 
@@ -34,7 +34,7 @@ class AccessLog:
         """Pass a request on and log it."""
         if scope["type"] != "http":
             return await self.application(scope, receive, send)
-        begun, start, status = datetime.now(UTC), perf_counter(), None
+        begun, start, status = datetime.now(UTC), time.perf_counter(), None
 
         async def sending(message: Message) -> None:
             nonlocal status
@@ -54,7 +54,7 @@ class AccessLog:
                 begun,
                 scope.get("client"),
                 status,
-                perf_counter() - start,
+                time.perf_counter() - start,
                 key=scope.get("state", {}).get(KEY_NAME),
                 operation=f"{scope['method']} {_endpoint(scope['path'], route.path)}" if route is not None else None,
                 entry="/".join(map(str, about.values())) or None,

@@ -1,4 +1,4 @@
-"""Chances by chi-square and Student's t, against scipy."""
+"""Chances by chi-square, F and Student's t, against scipy."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 
 import pytest
 from scipy import special
-from shoal.identification.spread.chances import above_chi_square, chi_square_above, student_above
+from shoal.identification.spread.chances import above_chi_square, above_f, chi_square_above, student_above
 
 FREEDOMS = [0.3, 1.0, 2.0, 7.0, 31.9, 32.1, 97.3, 999.0, 1001.0, 1e4, 1e5]
 
@@ -35,3 +35,10 @@ def test_chi_square_is_above_what_scipy_tells_with_a_chance(freedom: int) -> Non
 def test_students_t_is_above_what_scipy_tells_with_a_chance(freedom: float) -> None:
     for chance in (0.1, 0.025, 0.005):
         assert student_above(freedom, chance) == pytest.approx(special.stdtrit(freedom, 1.0 - chance), rel=1e-12)
+
+
+@pytest.mark.parametrize("count", [1, 2, 7, 40])
+@pytest.mark.parametrize("freedom", [3.0, 30.5, 1e4])
+def test_f_is_that_of_scipy(count: int, freedom: float) -> None:
+    for ratio in (0.01, 0.5, 1.0, 2.0, 8.0):
+        assert above_f(count, freedom, ratio) == pytest.approx(special.fdtrc(count, freedom, ratio), rel=1e-8)

@@ -213,7 +213,7 @@ def test_a_misfit_only_where_no_derivatives_hold_is_not_held_against_the_model(
     near = evidence(model, CHAOTIC)
     outcome = Outcome(CHAOTIC, float(model.cost(near.residual[None])[0]), [], "")
     values = intervals.parameters(model, CHAOTIC, near.at, near.correction)
-    found = judge(model, outcome, near.seen, near.at, near.tests, values, [])
+    found = judge(model, outcome, near.seen, near.at, near.tests, near.score_test(model), values, [])
     assert found.verdict is verdict
     if verdict is Verdict.UNFINISHED:
         assert near.tests.wrong_model
@@ -234,7 +234,7 @@ def test_the_cause_of_derivatives_that_do_not_hold_is_told(magnified: float, cau
     near = evidence(model, np.array([0.5, 0.2]))
     outcome = Outcome(near.point, float(model.cost(near.residual[None])[0]), [], "")
     values = intervals.parameters(model, near.point, near.at, near.correction)
-    assert cause in judge(model, outcome, rough, near.at, near.tests, values, []).message
+    assert cause in judge(model, outcome, rough, near.at, near.tests, near.score_test(model), values, []).message
 
 
 def test_derivatives_that_hold_are_those_of_the_whole_record() -> None:

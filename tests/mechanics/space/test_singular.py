@@ -55,10 +55,15 @@ def test_an_integrator_keeps_its_order_when_started_at_the_singular_position(
 
 
 @pytest.mark.parametrize("step", [0.02, 0.005, 0.00125])
-def test_steps_too_long_for_a_linkage_that_its_geometry_lets_move_end_in_a_status(step: float) -> None:
-    run = simulate(Scene.parse(linkage(0.6) | {"solver": {"integrator": "leapfrog", "step": step}}), np.array([0.4]))
-    assert not run.ok
-    assert "energy" in run.message or "reach" in run.message
+def test_long_steps_of_a_linkage_that_its_geometry_lets_move_are_right_or_end_in_a_status(step: float) -> None:
+    """Leapfrog is of second order; the truth is that of dop853."""
+    scenes = ({"integrator": "leapfrog", "step": step}, {"integrator": "dop853"})
+    run, true = (simulate(Scene.parse(linkage(0.6) | {"solver": one}), np.array([0.4])) for one in scenes)
+    assert run.ok == (step < 0.01)
+    if run.ok:
+        assert run.distance(true) < 3.0 * step**2
+    else:
+        assert any(word in run.message for word in ("energy", "reach", "cannot be closed"))
 
 
 def test_what_holds_twice_is_named_at_a_singular_position_too() -> None:

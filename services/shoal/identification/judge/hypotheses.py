@@ -14,12 +14,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from shoal.identification.spread.chances import above_f
 from shoal.identification.spread.covariance import Block, Noise, correlate, estimate_noise
 from shoal.identification.spread.given import Given
 from shoal.trajectory import Array
 
 SIGNIFICANT = 5e-4
 """P-value over all hypotheses below which the data contradict one: of 2000 right models one is rejected."""
+
+_ROUND_OFF = 1e-9
+"""Of the largest eigenvalue of correlations: a smaller one counts as none."""
 
 
 @dataclass(frozen=True)
@@ -96,7 +100,7 @@ class ScoreTest:
         total = max(float(np.sum(parts)), 1e-300)
         doubt = sum((part / total) ** 2 / free for part, free in zip(parts, freedom, strict=True))
         along = slope @ own
-        chance = _above_f(count, 1.0 / max(doubt, 1e-9), drop / count)
+        chance = above_f(count, 1.0 / max(doubt, 1e-9), drop / count)
         return drop, chance, explained, along / max(float(np.linalg.norm(along)), 1e-300)
 
     def _own(self, effects: Array) -> Array:
@@ -144,13 +148,3 @@ def independent(units: Array) -> float:
     values = np.abs(np.linalg.eigvalsh(units @ units.T))
     values = np.where(values < _ROUND_OFF * len(units), 0.0, values + _ROUND_OFF)
     return float(np.sum((values >= 1.0) + (values - np.floor(values))))
-
-
-_ROUND_OFF = 1e-9
-
-
-def _above_f(count: int, freedom: float, ratio: float) -> float:
-    """Chance that F with (count, freedom) degrees of freedom is above a ratio."""
-    from scipy.special import fdtrc  # slow to import
-
-    return float(fdtrc(count, freedom, ratio)) if ratio > 0.0 else 1.0

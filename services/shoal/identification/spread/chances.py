@@ -72,6 +72,21 @@ def student_above(freedom: float, chance: float) -> float:
     return t
 
 
+def above_f(count: float, freedom: float, ratio: float) -> float:
+    """Return the chance that F with (count, freedom) degrees of freedom is above a ratio; freedom may be infinite."""
+    if not ratio > 0.0:
+        return 1.0
+    if math.isinf(freedom):
+        return above_chi_square(count, count * ratio)
+    a, b, x = 0.5 * freedom, 0.5 * count, freedom / (freedom + count * ratio)
+    log_beta = math.lgamma(a) + math.lgamma(b) - math.lgamma(a + b)
+    power = math.exp(a * math.log(x) + b * math.log1p(-x) - log_beta)
+    # Of the incomplete beta function, that side whose fraction converges.
+    if x < (a + 1.0) / (a + b + 2.0):
+        return power / a / _fraction(1.0, _beta(a, b, x))
+    return 1.0 - power / b / _fraction(1.0, _beta(b, a, 1.0 - x))
+
+
 def _student(freedom: float, t: float) -> tuple[float, float]:
     """Chance that Student's t is above t > 0, and its density there."""
     a, x = 0.5 * freedom, freedom / (freedom + t * t)
