@@ -104,6 +104,8 @@ class Orientations:
     of: dict[str, tuple[str, Array]] = field(default_factory=dict)
     directors: dict[str, tuple[Affine, ...]] = field(default_factory=dict)
     dimensions: int = plane.DIMENSIONS
+    driven: set[str] = field(default_factory=set)
+    """Roots whose directors have the length of others' by the cosine and the sine of driven angles between them."""
 
     def root(self, body: str) -> tuple[str, Array]:
         """Root and relative rotation of a body; a body by itself is its own root."""
@@ -154,7 +156,26 @@ def orientations(scene: Scene) -> Orientations:
             sides = condition.first, condition.second
             if all(is_stiff(scene, side.body) for side in sides):
                 found.join(name, sides[0].body, sides[1].body, kept_rotation(scene, condition))
+    found.driven = _driven(scene, found)
     return found
+
+
+def _driven(scene: Scene, turning: Orientations) -> set[str]:
+    """All roots but one of those that drives connect; the ground stays, whose directors need no constraint."""
+    leaders: dict[str, str] = {}
+
+    def leader(root: str) -> str:
+        while root in leaders:
+            root = leaders[root]
+        return root
+
+    for _, condition in joints.of_scene(scene):
+        if isinstance(condition, Turned) and condition.driven:
+            sides = condition.first.body, condition.second.body
+            one, other = sorted((leader(turning.root(side)[0]) for side in sides), key=lambda root: root != GROUND)
+            if one != other:
+                leaders[other] = one
+    return set(leaders)
 
 
 def kept_rotation(scene: Scene, condition: Turned) -> Array:

@@ -145,7 +145,8 @@ def _place_rigid(name: str, mine: list[JointPoint], pose: Pose, turning: Orienta
         else:
             axis = result.new_vector(pose.directors[0], pose.turning[0])
         turning.directors[root] = rotated((axis, axis.turned(plane.QUARTER)), transposed(relative))
-        result.terms.dot(name, axis, axis, 0, -1.0)
+        if root not in turning.driven:
+            result.terms.dot(name, axis, axis, 0, -1.0)
     directors = turning.of_body(name)
     frame = RigidFrame(where - combined(directors, p), directors)
     result.frames[name] = frame
