@@ -23,13 +23,14 @@ import pytest
 from click.testing import CliRunner
 from rich.console import Console
 from shoal.cli import main
+from shoal.compile import progress
 from shoal.doctor import Check
 from shoal.engines import get_engine
 from shoal.engines.compare import compare
 from shoal.engines.sweep import sweep
 from shoal.identification import Estimate, identify, load_problem
 from shoal.identification.design import design
-from shoal.mechanics import notes, warm
+from shoal.mechanics import warm
 from shoal.mechanics.analysis.campbell import campbell
 from shoal.mechanics.analysis.modes import modes
 from shoal.mechanics.analysis.reactions import reactions
@@ -306,8 +307,8 @@ def test_who_waits_for_the_compiler_is_told(monkeypatch: pytest.MonkeyPatch) -> 
     heard = Console(file=StringIO(), width=80)
     monkeypatch.setattr(screen, "err", heard)
     with screen.working("simulating"):
-        notes.tell("  march of Leapfrog, single: 9.1 s")
-    notes.tell("  nobody listens")
+        progress.report("  march of Leapfrog, single: 9.1 s")
+    progress.report("  nobody listens")
     assert heard.file.getvalue() == "  march of Leapfrog, single: 9.1 s\n"  # type: ignore[attr-defined]
 
 

@@ -14,8 +14,10 @@ from shoal.errors import InputError
 from shoal.versions import versions
 
 _PACKAGE = Path(__file__).parent
-_KERNELS = ("mechanics", "engines/tree")
-_IMPORT = re.compile(r"^\s*from shoal\.((?:mechanics|engines\.tree)[\w.]*) import (\([^)]*\)|.*)$", re.MULTILINE)
+_KERNELS = ("compile", "mechanics", "engines/tree")
+_IMPORT = re.compile(
+    r"^\s*from shoal\.((?:compile|mechanics|engines\.tree)[\w.]*) import (\([^)]*\)|.*)$", re.MULTILINE
+)
 
 
 def home() -> Path:

@@ -9,9 +9,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from shoal.compile import clock
 from shoal.engines import ENGINES
 from shoal.engines.contract import Capabilities, sampling_times
-from shoal.mechanics import clock
 from shoal.scene import Scene
 from shoal.trajectory import Array, Status, Trajectory
 

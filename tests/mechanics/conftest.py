@@ -7,10 +7,11 @@ from typing import Any
 
 import pytest
 from numba import njit
-from shoal.mechanics import constraints, gates
+from shoal.compile.pointers import pointer, raw
+from shoal.mechanics import constraints
+from shoal.mechanics import kernels as compiled
 from shoal.mechanics.least import drift
 from shoal.mechanics.numerics import sparse
-from shoal.mechanics.numerics.pointers import pointer, raw
 
 Array = Any
 
@@ -45,16 +46,16 @@ def bias(tile, held, drives, t, v, out):
 def acceleration(tile, arrays, room, tolerance):
     """The acceleration of the state in `room`, into room.a."""
     m, w = raw(arrays), raw(room)
-    gates.enter(m, w)
-    gates.acceleration(tile, m, w, 0.0, w.z, w.zdot, tolerance, w.a)
+    compiled.enter(m, w)
+    compiled.acceleration(tile, m, w, 0.0, w.z, w.zdot, tolerance, w.a)
 
 
 @njit(cache=True)
 def force(tile, arrays, room):
     """The generalised force of the state in `room`, into room.a."""
     m, w = raw(arrays), raw(room)
-    gates.enter(m, w)
-    gates.force(tile, m, w, 0.0, w.z, w.zdot, w.a)
+    compiled.enter(m, w)
+    compiled.force(tile, m, w, 0.0, w.z, w.zdot, w.a)
 
 
 @njit(cache=True)

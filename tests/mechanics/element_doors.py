@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 from numba import njit
+from shoal.compile.pointers import pointer, raw
 from shoal.mechanics.elements import families
-from shoal.mechanics.numerics.pointers import pointer, raw
 
 
 @njit(cache=True)

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 from numba import njit
+from shoal.compile.pointers import pointer, raw
 from shoal.mechanics.numerics import alike, sparse
-from shoal.mechanics.numerics.pointers import pointer, raw
 from shoal.mechanics.numerics.row_pairs import paired
 from shoal.mechanics.numerics.tile import SINGLE, WIDE, Tile
 

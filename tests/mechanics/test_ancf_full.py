@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from numba import njit
 from scipy.integrate import solve_bvp
+from shoal.compile.pointers import pointer, raw
 from shoal.mechanics.dynamics import ELEMENT_ROOM
 from shoal.mechanics.elements import ancf_full, families
 from shoal.mechanics.elements.ancf_full import LAWS
-from shoal.mechanics.numerics.pointers import pointer, raw
 from shoal.mechanics.numerics.tile import SINGLE, WIDE, packed
 
 YOUNG, POISSON, SHEAR, LENGTH, HEIGHT, WIDTH, DENSITY = 2e8, 0.3, 0.85, 0.5, 0.06, 0.04, 5540.0

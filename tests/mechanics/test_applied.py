@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numba import njit
+from shoal.compile.pointers import pointer, raw
 from shoal.mechanics import applied, fitting, functions
 from shoal.mechanics.applied import Applied
-from shoal.mechanics.numerics.pointers import pointer, raw
 from shoal.mechanics.numerics.tile import SINGLE, WIDE, Tile
 
 Array = Any

@@ -8,9 +8,9 @@ import element_doors as doors
 import numpy as np
 import pytest
 from numba import njit
+from shoal.compile.pointers import pointer, raw
 from shoal.mechanics.dynamics import ELEMENT_ROOM
 from shoal.mechanics.elements import director, families
-from shoal.mechanics.numerics.pointers import pointer, raw
 from shoal.mechanics.numerics.tile import SINGLE, WIDE, packed
 from shoal.scene.sections import Rectangle
 

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numba import njit
+from shoal.compile.pointers import pointer, raw
 from shoal.mechanics import fitting, forces, functions
 from shoal.mechanics.forces import ANGLE, DISTANCE, LAW, PLACE, Forces
-from shoal.mechanics.numerics.pointers import pointer, raw
 from shoal.mechanics.numerics.tile import SINGLE, WIDE, Tile
 
 Array = Any

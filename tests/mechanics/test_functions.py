@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numba import njit
 from scipy.interpolate import CubicSpline
+from shoal.compile.pointers import raw
 from shoal.errors import InputError
 from shoal.mechanics import fitting, functions
-from shoal.mechanics.numerics.pointers import raw
 from shoal.scene.function import Function
 
 Array = Any

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from shoal.mechanics.assembly.build import build
 from shoal.mechanics.dynamics import work_space
-from shoal.mechanics.gates import ready
+from shoal.mechanics.kernels import ready
 from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import SINGLE, WIDE
 from shoal.mechanics.simulate import simulate

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 from numba import njit
+from shoal.compile.pointers import raw
 from shoal.mechanics.assembly.build import build
 from shoal.mechanics.integrators import guess
-from shoal.mechanics.numerics.pointers import raw
 from shoal.mechanics.numerics.tile import SINGLE
 from shoal.mechanics.simulate import simulate
 from shoal.mechanics.tangent import tangent_tile

@@ -19,11 +19,11 @@ from shoal.api.held import NoSuch
 from shoal.api.limits import TooMuch
 from shoal.api.settings import Settings
 from shoal.api.tasks import Bench, Note
+from shoal.compile import clock
 from shoal.engines.contract import Engine
 from shoal.engines.verification import verified
 from shoal.errors import InputError, ShoalError
 from shoal.identification import Problem
-from shoal.mechanics import clock
 from shoal.scene import Scene, load_scene
 from shoal.versions import versions
 

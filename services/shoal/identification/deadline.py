@@ -8,7 +8,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from shoal.mechanics import clock
+from shoal.compile import clock
 from shoal.scene import Scene
 from shoal.trajectory import Array, Trajectory
 

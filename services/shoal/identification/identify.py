@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from shoal.arguments import check
+from shoal.compile import clock
 from shoal.engines import get_engine
 from shoal.errors import InputError
 from shoal.identification.adapt import Stage, Stopped, coarse_to_fine
@@ -32,7 +33,6 @@ from shoal.identification.recording.measurement import Measurement
 from shoal.identification.recording.plausible import check_constant
 from shoal.identification.recording.source import EngineSource
 from shoal.identification.spread.posterior import require_sampler
-from shoal.mechanics import clock
 from shoal.memory import Memory
 from shoal.trajectory import Array
 from shoal.versions import versions

@@ -1,5 +1,3 @@
-"""The native solver: planar rigid-flexible dynamics by Gauss's principle, compiled, many lanes at once."""
+"""The native solver: rigid-flexible dynamics by Gauss's principle, compiled, many lanes at once."""
 
-from shoal.home import prepare_kernel_cache
-
-prepare_kernel_cache()  # before Numba is first imported
+import shoal.compile  # noqa: F401 - sets the folder of compiled kernels before Numba is imported

@@ -17,9 +17,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from shoal.compile import simd
 from shoal.mechanics import functions
 from shoal.mechanics.functions import Functions
-from shoal.mechanics.numerics import simd
 from shoal.mechanics.numerics.tile import Array, Index, Tile
 
 POWERS = 3

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 from numba import njit
 
+from shoal.compile.vector import add_product, clear, copy
 from shoal.mechanics.numerics.tile import Array, Index, Tile
-from shoal.mechanics.numerics.vector import add_product, clear, copy
 
 
 class Derived(NamedTuple):

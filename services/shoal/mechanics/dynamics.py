@@ -1,4 +1,4 @@
-"""From a state to its acceleration: derived rows, forces, constraints. The time loop comes here through `gates`."""
+"""From a state to its acceleration: derived rows, forces, constraints. The time loop comes here through `kernels`."""
 
 from __future__ import annotations
 
@@ -7,16 +7,17 @@ from typing import NamedTuple
 import numpy as np
 from numba import literal_unroll, njit
 
+from shoal.compile import function_pointers, simd, structures
+from shoal.compile.pointers import pointer, raw
+from shoal.compile.vector import clear
 from shoal.mechanics import applied, constraints, forces, rubbing
 from shoal.mechanics.derived import Derived, derive, fold
 from shoal.mechanics.elements import families
 from shoal.mechanics.least import principle
 from shoal.mechanics.least import work as least
 from shoal.mechanics.model import Arrays
-from shoal.mechanics.numerics import alike, gate, simd, sparse
-from shoal.mechanics.numerics.pointers import pointer, raw
+from shoal.mechanics.numerics import alike, sparse
 from shoal.mechanics.numerics.tile import Array, Tile
-from shoal.mechanics.numerics.vector import clear
 
 ELEMENT_ROWS = 64
 ELEMENT_ROOM = 1024
@@ -37,7 +38,7 @@ class Work(NamedTuple):
     friction by joint forces.
     """
 
-    home: Array
+    storage: Array
     z: Array
     zdot: Array
     a: Array
@@ -69,7 +70,7 @@ def work_space(tile: Tile, m: Arrays) -> Work:
     )
     z, zdot, a, before, stage, element, memory, power, energy = (np.zeros(size) for size in sizes)
     return Work(
-        gate.home(),
+        structures.storage(),
         z,
         zdot,
         a,
@@ -132,7 +133,7 @@ def free(m: Arrays) -> bool:
     """Return whether nothing acts on the machine but weight and undamped elements, and no constraint: as fast ones
     are.
     """
-    return m.constraints.size == 0 and m.gates.sought == 0 and not loaded(m)
+    return m.constraints.size == 0 and m.table.sought == 0 and not loaded(m)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -160,7 +161,7 @@ def _add_elements(tile: Tile, m: Arrays, w: Work, z: Array, zdot: Array, f: Arra
     for family in literal_unroll(m.elements):
         kind += 1
         if family.size > 0 and not (part == SIMPLE and families.is_exact(family)):
-            gate.call(m.gates.force[kind], (tile, family, z, zdot, f, w.element, w.power, moving))
+            function_pointers.call(m.table.force[kind], (tile, family, z, zdot, f, w.element, w.power, moving))
     fold(tile, m.derived, f, m.force_rows)
 
 
@@ -174,9 +175,9 @@ def add_mean_force(tile: Tile, m: Arrays, w: Work, before: Array, after: Array, 
 @njit(cache=True, error_model="numpy", inline="always")
 def accelerate(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, tolerance: float, a: Array) -> None:
     """Turn all of the force in `a` into the acceleration by Gauss's principle, valid on the unknowns."""
-    if m.constraints.size > 0 or m.gates.sought != 0:
-        arguments = (gate.typed(m.home, m), gate.typed(w.home, w), t, z, zdot, tolerance, a)
-        gate.call(m.gates.constrain, (tile, *arguments))
+    if m.constraints.size > 0 or m.table.sought != 0:
+        arguments = (structures.pointer_to(m.storage, m), structures.pointer_to(w.storage, w), t, z, zdot, tolerance, a)
+        function_pointers.call(m.table.constrain, (tile, *arguments))
     else:
         _solve(tile, m, w, a)
 
@@ -193,9 +194,9 @@ def _solve(tile: Tile, m: Arrays, w: Work, a: Array) -> None:
 @njit(cache=True, error_model="numpy", inline="always")
 def constrain(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, tolerance: float, a: Array) -> None:
     """`accelerate` where there are constraints, or somebody else who seeks the acceleration."""
-    if m.gates.sought != 0:
+    if m.table.sought != 0:
         principle.state(tile, m, w.gauss, t, z, zdot)
-        gate.ask(m.gates.sought, t, a)
+        function_pointers.call_back(m.table.sought, t, a)
     else:
         _constrain(tile, m, w, t, z, zdot, tolerance, a)
     if m.driven:
@@ -254,6 +255,6 @@ def energies(tile: Tile, m: Arrays, w: Work) -> None:
     for family in literal_unroll(m.elements):
         kind += 1
         if family.size > 0:
-            gate.call(m.gates.energy[kind], (tile, family, w.z, w.element, w.energy, 1))
+            function_pointers.call(m.table.energy[kind], (tile, family, w.z, w.element, w.energy, 1))
     simd.store(w.energy, 3 * width, simd.load(tile, w.energy, width))
     forces.add_energy(tile, m.forces, m.functions, w.z, w.memory, w.element, w.energy, 1)

@@ -11,10 +11,10 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from shoal.compile.vector import add_product, clear, copy
 from shoal.mechanics import plane
 from shoal.mechanics.functions import Functions, evaluate, excess
 from shoal.mechanics.numerics.tile import Array, Index, Tile
-from shoal.mechanics.numerics.vector import add_product, clear, copy
 
 DISTANCE, ANGLE, PLACE = 0, 1, 2
 """Measures: |b - a| [m] of two points; the angle [rad] of the plane from direction a to direction b, over any number of

@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from shoal.compile import clock
 from shoal.errors import InputError, UnstableStepError
-from shoal.mechanics import clock, plane
+from shoal.mechanics import plane
 from shoal.mechanics import reach as reaches
 from shoal.mechanics.assembly.groups import start_angle
 from shoal.mechanics.assembly.space import start as spatial
@@ -21,10 +22,10 @@ from shoal.mechanics.assembly.space.redundancy import redundant as redundant_in_
 from shoal.mechanics.assembly.starts import Starts
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.ended import Ended
-from shoal.mechanics.gates import Seek
 from shoal.mechanics.halts import Halts
 from shoal.mechanics.integrators import Choice, halting
 from shoal.mechanics.integrators import facts as facts_of
+from shoal.mechanics.kernels import Seek
 from shoal.mechanics.marched import CONSTRAINT_DRIFT, ENERGY_DRIFT, EVALUATIONS, NEAR, NUMBERS, STEPS, TURN, told
 from shoal.mechanics.model import Arrays, Model
 from shoal.mechanics.numerics.tile import SINGLE, WIDE, Array, Tile, stacked, tiles

@@ -1,9 +1,9 @@
 """The time loop of one tile: sample, advance, account for power, look at energy and drift.
 
     march ── _sample ─ scheme.interpolate (the integrator's dense output)
-          ── _advance ─ scheme.advance (the integrator's step) ─ gates.acceleration ─ dynamics.accelerate ─ least
+          ── _advance ─ scheme.advance (the integrator's step) ─ kernels.acceleration ─ dynamics.accelerate ─ least
           ── _account ─ what loads, dampers and drives did in the step
-          ── _look ─ gates.energies, constraints.drift
+          ── _look ─ kernels.energies, constraints.drift
 
 An integrator's step stands in its own file; `integrators.scheme` chooses it by the type of its settings. A step is cut
 short where functions of time are not smooth (`halts`).
@@ -16,15 +16,15 @@ from typing import Any
 import numpy as np
 from numba import carray, njit
 
-from shoal.mechanics import constraints, gates
+from shoal.compile import function_pointers, simd, structures
+from shoal.compile.pointers import pointer
+from shoal.mechanics import constraints, kernels
 from shoal.mechanics.derived import derive
 from shoal.mechanics.dynamics import Work, loaded, remember
 from shoal.mechanics.halts import RESOLUTION, Halts, elongations, leapt
 from shoal.mechanics.integrators.scheme import adaptive, advance, averages, interpolate, restart
 from shoal.mechanics.marched import Frame, LoopRoom, Marched, frame_type, framed, loop_of, sampled
 from shoal.mechanics.model import Arrays
-from shoal.mechanics.numerics import gate, simd
-from shoal.mechanics.numerics.pointers import pointer
 from shoal.mechanics.numerics.tile import Array, Index, Tile
 
 ASSEMBLY = 30
@@ -45,18 +45,18 @@ class March:
 
     def __init__(self, frame: Frame) -> None:
         self.frame = frame
-        self._home = gate.home()
-        gate.put(frame.arrays.home, frame.arrays)
-        gate.put(frame.room.home, frame.room)
-        gate.put(self._home, frame)
+        self._storage = structures.storage()
+        structures.write(frame.arrays.storage, frame.arrays)
+        structures.write(frame.room.storage, frame.room)
+        structures.write(self._storage, frame)
         kinds = loop_of(frame)
         if kinds not in _LOOPS:
-            _LOOPS[kinds] = gate.address(loop, (frame_type(frame),))
+            _LOOPS[kinds] = function_pointers.address(loop, (frame_type(frame),))
         self._loop = _LOOPS[kinds]
 
     def __call__(self) -> None:
         """Run; the record is in the frame, the state at the end in its room. Holds no lock of the interpreter."""
-        _call(self._loop, self._home)
+        _call(self._loop, self._storage)
 
 
 _LOOPS: dict[tuple[Any, ...], int] = {}
@@ -71,14 +71,14 @@ def march(*arguments: Any) -> Marched:
 
 
 @njit(cache=True, nogil=True)
-def _call(address: int, home: Array) -> None:
-    gate.call(address, (pointer(home),))
+def _call(address: int, storage: Array) -> None:
+    function_pointers.call(address, (pointer(storage),))
 
 
 @njit(cache=True, error_model="numpy")
 def loop(place):  # type: ignore[no-untyped-def]
     """The march of the frame at a place."""
-    frame = gate.load(place)
+    frame = structures.load(place)
     tile, scheme, m, w, k, record = frame.tile, frame.scheme, frame.arrays, frame.room, frame.own, frame.record
     step, steps, tolerance = frame.step, frame.steps, frame.tolerance
     times, marker_rows = carray(frame.times, frame.samples), carray(frame.marker_rows, frame.directed)
@@ -140,10 +140,10 @@ def loop(place):  # type: ignore[no-untyped-def]
 def _begin(tile: Tile, m: Arrays, w: Work, k: LoopRoom, record: Marched, marker_rows: Index, tolerance: float) -> None:
     """Make the start consistent and keep it, find its acceleration, its energy and the sides of the directions."""
     end = m.unknowns * len(tile)
-    gates.settle(tile, m, w, 0.0, tolerance, ASSEMBLY)
+    kernels.settle(tile, m, w, 0.0, tolerance, ASSEMBLY)
     for i in range(end):
         record.begin[i], record.begin[end + i] = w.z[i], w.zdot[i]
-    gates.acceleration(tile, m, w, 0.0, w.z, w.zdot, tolerance, w.a)
+    kernels.acceleration(tile, m, w, 0.0, w.z, w.zdot, tolerance, w.a)
     for lane in range(len(tile)):
         k.last_power[lane] = w.power[lane]
     _energy(tile, m, w, k.start, record.energy_scale)
@@ -204,13 +204,13 @@ def _leave_halt(
     restart(scheme)
     if m.driven:
         _energy(tile, m, w, k.energy, scale)
-        gates.meet(tile, m, w, now, tolerance)
+        kernels.meet(tile, m, w, now, tolerance)
         for lane in range(len(tile)):
             k.dissipated[lane] += k.energy[lane]
         _energy(tile, m, w, k.energy, scale)
         for lane in range(len(tile)):
             k.dissipated[lane] -= k.energy[lane]
-    gates.acceleration(tile, m, w, now, w.z, w.zdot, tolerance, w.a)
+    kernels.acceleration(tile, m, w, now, w.z, w.zdot, tolerance, w.a)
     for lane in range(len(tile)):
         k.last_power[lane] = w.power[lane]
 
@@ -264,9 +264,9 @@ def _account(
         for x in (LOBATTO, 1.0 - LOBATTO):
             interpolate(tile, scheme, m, w, k.past, x, taken, k.q, k.v)
             if m.driven or m.rubbing.size > 0:
-                gates.acceleration(tile, m, w, begin + x * taken, k.q, k.v, tolerance, w.stage)
+                kernels.acceleration(tile, m, w, begin + x * taken, k.q, k.v, tolerance, w.stage)
             else:
-                gates.force(tile, m, w, begin + x * taken, k.q, k.v, w.stage)
+                kernels.force(tile, m, w, begin + x * taken, k.q, k.v, w.stage)
             for lane in range(width):
                 k.dissipated[lane] += taken * 5.0 / 12.0 * w.power[lane]
     weight = 1.0 / 12.0 if free else 0.5
@@ -318,7 +318,7 @@ def _energy(tile: Tile, m: Arrays, w: Work, total: Array, scale: Array) -> None:
     The potential of springs may be negative, such as that of a constant force: its size counts.
     """
     width = len(tile)
-    gates.energies(tile, m, w)
+    kernels.energies(tile, m, w)
     for lane in range(width):
         kinetic, elastic, bodies = w.energy[lane], w.energy[width + lane], w.energy[3 * width + lane]
         total[lane] = kinetic + elastic + w.energy[2 * width + lane]

@@ -7,11 +7,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit, typeof, types
 
+from shoal.compile.pointers import raw_type
 from shoal.mechanics import constraints
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.halts import Halts
 from shoal.mechanics.model import Arrays
-from shoal.mechanics.numerics.pointers import raw_type
 from shoal.mechanics.numerics.tile import Array, Index, Tile
 
 TURN = 2.0 * np.pi

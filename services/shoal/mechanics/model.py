@@ -14,6 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
+from shoal.compile import structures
+from shoal.compile.pointers import pointer, raw
 from shoal.errors import InputError
 from shoal.mechanics import saddle
 from shoal.mechanics.applied import Applied
@@ -22,9 +24,8 @@ from shoal.mechanics.derived import Derived
 from shoal.mechanics.forces import LAW, STIFFNESS, Forces
 from shoal.mechanics.frames import Frame, ModalFrame
 from shoal.mechanics.functions import Functions, Piecewise
-from shoal.mechanics.numerics import alike, gate, sparse
+from shoal.mechanics.numerics import alike, sparse
 from shoal.mechanics.numerics.alike import Alike
-from shoal.mechanics.numerics.pointers import pointer, raw
 from shoal.mechanics.numerics.row_pairs import paired
 from shoal.mechanics.numerics.tile import SINGLE, Array, Flags, Index, Tile, pack, packed, varies
 from shoal.mechanics.rubbing import Rubbing
@@ -33,8 +34,8 @@ from shoal.scene import Scene
 from shoal.scene.joints import places
 
 
-class Gates(NamedTuple):
-    """Addresses of the kernels of `gates` for one width; 0 for what the model has no use for and so never calls.
+class FunctionTable(NamedTuple):
+    """Addresses of the compiled `kernels` for one tile; 0 for a kernel that the model never calls.
 
     force, energy: by family of elements. sought: what seeks accelerations in place of `constrain`'s own ways.
     """
@@ -56,8 +57,8 @@ class Arrays(NamedTuple):
     elements: one structure a family. alike: the mass matrix where all lanes have the same one.
     """
 
-    home: Array
-    gates: Gates
+    storage: Array
+    table: FunctionTable
     space: tuple[int, ...]
     unknowns: int
     force_rows: int
@@ -275,8 +276,8 @@ class Model:
         forces = self.elements, self.forces, self.applied, self.functions, self.constraints, self._saddle, self.rubbing
         nobody = np.zeros(len(self.elements), dtype=np.int64)
         return Arrays(
-            gate.home(),
-            Gates(0, 0, 0, 0, nobody, nobody),
+            structures.storage(),
+            FunctionTable(0, 0, 0, 0, nobody, nobody),
             (0,) * self.dimensions,
             self.unknowns,
             self.force_rows,

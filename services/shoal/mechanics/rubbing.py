@@ -13,12 +13,12 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from shoal.compile.pointers import shift
+from shoal.compile.vector import add_product, clear, copy
 from shoal.mechanics import forces
 from shoal.mechanics.derived import Derived, fold
 from shoal.mechanics.forces import LAW, SPEED, Forces
-from shoal.mechanics.numerics.pointers import shift
 from shoal.mechanics.numerics.tile import Array, Index, Tile
-from shoal.mechanics.numerics.vector import add_product, clear, copy
 
 ROUNDS = 200
 """At most so many accelerations."""

@@ -18,10 +18,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
+from shoal.compile import simd
+from shoal.compile.vector import copy
 from shoal.mechanics.constraints import Constraints
-from shoal.mechanics.numerics import simd, sparse
+from shoal.mechanics.numerics import sparse
 from shoal.mechanics.numerics.tile import Array, Index, Tile
-from shoal.mechanics.numerics.vector import copy
 
 SMALL = 16
 """Up to so many constraints the orthogonal projection is used near singular positions, where it is more accurate."""

@@ -7,14 +7,13 @@ from functools import lru_cache
 
 import numpy as np
 
-from shoal.mechanics import clock, notes
+from shoal.compile import clock, deferred, progress
 from shoal.mechanics.assembly.build import build
 from shoal.mechanics.dynamics import Work
-from shoal.mechanics.gates import Seek
 from shoal.mechanics.inertia_cap import capped
 from shoal.mechanics.integrators import facts, pick
 from shoal.mechanics.integrators.scheme import Facts
-from shoal.mechanics.later import put_off
+from shoal.mechanics.kernels import Seek
 from shoal.mechanics.machine import Machine
 from shoal.mechanics.model import Arrays, Model
 from shoal.mechanics.numerics.tile import Array
@@ -22,7 +21,7 @@ from shoal.mechanics.start import start
 from shoal.scene import Scene, Solver
 from shoal.trajectory import Trajectory
 
-put_off()
+deferred.install()
 
 STEP_MARGIN = 0.95
 """Of the stable step, which is that of the start and varies by a few percent along the motion."""
@@ -107,7 +106,7 @@ def _model(scene_json: str, horizon: float) -> Model:
 
 def _built(scene: Scene, lanes: int, horizon: float) -> Model:
     """The model of a scene, whose friction must know the forces that it depends on."""
-    notes.begin()
+    progress.begin()
     model = capped(build(scene, lanes, horizon))
     if model.rubbing.size:
         from shoal.mechanics.analysis.joint_reactions import require_unique_friction

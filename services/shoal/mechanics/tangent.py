@@ -8,13 +8,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import literal_unroll, njit
 
-from shoal.mechanics import forces, gates, saddle
+from shoal.compile import function_pointers, simd
+from shoal.compile.pointers import pointer, raw, shift
+from shoal.compile.vector import add, add_product
+from shoal.mechanics import forces, kernels, saddle
 from shoal.mechanics.dynamics import Work, derived_rows
 from shoal.mechanics.model import Arrays, Model, scatter
-from shoal.mechanics.numerics import gate, simd, sparse
-from shoal.mechanics.numerics.pointers import pointer, raw, shift
+from shoal.mechanics.numerics import sparse
 from shoal.mechanics.numerics.tile import Array, Index, Tile, index, pack, stacked
-from shoal.mechanics.numerics.vector import add, add_product
 
 _ONE = np.ones(1)
 
@@ -102,8 +103,8 @@ def tangent_tile(model: Model, tile: Tile, lanes: slice, *, held: bool = False) 
         index([slot[key] for key, *_ in curved]),
         index([owner for _, owner, _ in curved]),
         pack(stacked([c for *_, c in curved]), lanes, tile),
-        gates.family_gates("stiffness", tile, model.elements),
-        gates.family_gates("damping", tile, model.elements),
+        kernels.family_pointers("stiffness", tile, model.elements),
+        kernels.family_pointers("damping", tile, model.elements),
         rows,
     )
 
@@ -197,7 +198,7 @@ def _fill(tile: Tile, m: Arrays, t: Tangent, w: Work, z: Array, block: Array) ->
     for family in literal_unroll(m.elements):
         kind += 1
         if family.size > 0:
-            gate.call(t.stiffness[kind], (tile, family, z, w.element, block, first))
+            function_pointers.call(t.stiffness[kind], (tile, family, z, w.element, block, first))
         first += family.side * family.side * family.size
     forces.tangent(tile, m.forces, m.functions, z, w.memory, w.element, block, first)
 
@@ -211,7 +212,7 @@ def _fill_damping(tile: Tile, m: Arrays, t: Tangent, w: Work, z: Array, block: A
     for family in literal_unroll(m.elements):
         kind += 1
         if family.size > 0 and family.damped:
-            gate.call(t.damping[kind], (tile, family, z, w.element, block, first))
+            function_pointers.call(t.damping[kind], (tile, family, z, w.element, block, first))
         first += family.side * family.side * family.size
     forces.damping(tile, m.forces, z, w.zdot, w.element, block, first)
 
@@ -257,7 +258,7 @@ def _assembled(tile: Tile, t: Tangent, block: Array) -> Array:
 @njit(cache=True, error_model="numpy")
 def _of_family(tile: Tile, address: int, family: Any, z: Array, w: Array, block: Array, first: int) -> None:
     """What the kernel at an address, for the stiffness or the damping, finds of a family."""
-    gate.call(address, (tile, raw(family), pointer(z), pointer(w), pointer(block), first))
+    function_pointers.call(address, (tile, raw(family), pointer(z), pointer(w), pointer(block), first))
 
 
 @njit(cache=True, error_model="numpy")

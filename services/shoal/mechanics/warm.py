@@ -19,15 +19,16 @@ import numpy as np
 from numba import config
 
 from shoal.children import end_with_parent
+from shoal.compile import clock
+from shoal.compile.locks import SECONDS, described
+from shoal.compile.progress import Note, reporting_to
 from shoal.errors import ShoalError
-from shoal.mechanics import clock, gates
+from shoal.mechanics import kernels
 from shoal.mechanics.assembly.build import build
-from shoal.mechanics.compilation import SECONDS, described
 from shoal.mechanics.dynamics import work_space
 from shoal.mechanics.integrators import INTEGRATORS, choose, facts, halting
 from shoal.mechanics.march import loop
 from shoal.mechanics.marched import frame_type, framed
-from shoal.mechanics.notes import Note, telling
 from shoal.mechanics.numerics.tile import tiles
 from shoal.mechanics.simulate import simulate
 from shoal.scene import Scene, load_scene
@@ -56,14 +57,14 @@ def warm(integrators: Iterable[str] = tuple(INTEGRATORS), note: Note = lambda _:
     """Compile what is not yet in the cache, on all cores, and load it; returns the seconds it took.
 
     every: for any scene, with constraints and all families of elements; else for cables that hang together. The first
-    integrator comes with the gates, which the others use again. `note` is told what is being done.
+    integrator comes with the kernels of the mechanics, which the others share. `note` is told what is being done.
     """
     begin = time.perf_counter()
     first, *others = integrators
     for names in ([first], others):
         scenes = [(_pendulum(name), lanes) for name in names for lanes in _lanes(name)]
-        ahead([kernel for scene, lanes in scenes for kernel in kernels(scene, lanes, every=every)], note)
-    with telling(note):  # what is small
+        ahead([kernel for scene, lanes in scenes for kernel in required(scene, lanes, every=every)], note)
+    with reporting_to(note):  # what is small
         for name in (first, *others):
             for lanes in _lanes(name):
                 angles = {"initial.OA.angle": np.linspace(0.7, 0.8, lanes)} if lanes > 1 else None
@@ -82,7 +83,7 @@ def warm_for(scenes: Iterable[Scene], lanes: Iterable[int], note: Note) -> None:
         mark = Path(config.CACHE_DIR) / f"ahead-{_likeness(scene, count)}"
         if not mark.exists():
             with suppress(ShoalError):
-                wanted[mark] = kernels(scene, count)
+                wanted[mark] = required(scene, count)
     ahead(itertools.chain(*wanted.values()), note)
     for mark in wanted:
         with suppress(OSError):  # the next run looks again
@@ -123,8 +124,8 @@ def ahead(wanted: Iterable[Kernel], note: Note) -> None:
         note(f"  no further processes ({error}): the run compiles what it calls, one after the other")
 
 
-def kernels(scene: Scene, lanes: int, *, every: bool = False) -> list[Kernel]:
-    """The large kernels of a run of so many lanes; every: also for constraints and families that the scene lacks.
+def required(scene: Scene, lanes: int, *, every: bool = False) -> list[Kernel]:
+    """Return the large kernels of a run of n lanes; every: also for constraints and families that the scene lacks.
 
     Under `auto` those of its usual choice. Raises InputError if the scene cannot be modelled.
     """
@@ -137,14 +138,14 @@ def kernels(scene: Scene, lanes: int, *, every: bool = False) -> list[Kernel]:
     room, scheme = work_space(tile, arrays), choose(scene.solver, model, tile, lane, name)
     stops = halting(scene.solver, model, name, scene.solver.duration)
     frame = framed(tile, scheme, arrays, room, 0.0, 0, np.zeros(1), model.marker_rows.ravel(), 0.0, stops)
-    shared = [Kernel(kernel.__name__, kinds) for kernel, kinds in gates.kernels(tile, arrays, room, every=every)]
+    shared = [Kernel(kernel.__name__, kinds) for kernel, kinds in kernels.signatures(tile, arrays, room, every=every)]
     if lanes > 1 and not every:  # lanes mostly differ in their start alone, and share one stability limit
         shared = [kernel for kernel in shared if kernel.name != "_stiffness"]
     return [Kernel(loop.__name__, (frame_type(frame),)), *shared]
 
 
 def _function(name: str) -> Any:
-    return loop if name == loop.__name__ else getattr(gates, name)
+    return loop if name == loop.__name__ else getattr(kernels, name)
 
 
 def _compile(kernel: Kernel) -> str:

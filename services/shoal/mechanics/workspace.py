@@ -10,9 +10,9 @@ import numpy as np
 from shoal.errors import InputError
 from shoal.mechanics import forces, states
 from shoal.mechanics.dynamics import Work, derived_rows, work_space
-from shoal.mechanics.gates import Seek, Sought, ready
 from shoal.mechanics.halts import Halts
 from shoal.mechanics.integrators import Choice, choose, facts
+from shoal.mechanics.kernels import Seek, Sought, ready
 from shoal.mechanics.least.principle import PROJECTION
 from shoal.mechanics.march import March
 from shoal.mechanics.marched import Marched, framed

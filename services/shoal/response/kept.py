@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shoal.mechanics import clock
+from shoal.compile import clock
 from shoal.memory import Memory
 from shoal.response.runs import Answers, TooManyRunsError
 from shoal.trajectory import Array

@@ -13,11 +13,12 @@ from typing import Any
 import numpy as np
 
 from shoal.arguments import check
+from shoal.compile import clock
 from shoal.engines import get_engine
 from shoal.engines.contract import sampling_times
 from shoal.engines.starts import Stated, Tally
 from shoal.errors import ComputationError, InputError
-from shoal.mechanics import clock, reach
+from shoal.mechanics import reach
 from shoal.memory import Memory
 from shoal.response.allocation import (
     TARGET,

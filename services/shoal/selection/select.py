@@ -9,12 +9,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from shoal.arguments import check
+from shoal.compile import clock
 from shoal.engines.contract import sampling_times
 from shoal.engines.gauss import GaussEngine
 from shoal.engines.theory import left_out, softer
 from shoal.error_budget import ErrorBudget
 from shoal.errors import ComputationError, InputError
-from shoal.mechanics import clock
 from shoal.scene import Rod, Scene
 from shoal.selection.beyond import folded
 from shoal.selection.climb import PATIENCE, YARDSTICK, Progress, Runs, climb, settled

@@ -12,8 +12,8 @@ from rich.markup import escape
 from rich.measure import Measurement
 from rich.table import Table
 
+from shoal.compile import progress
 from shoal.error_budget import Grade
-from shoal.mechanics import notes
 from shoal.scene import Scene
 from shoal.trajectory import json_text
 
@@ -39,15 +39,15 @@ def show(data: Mapping[str, Any], as_json: bool, draw: Callable[[], None]) -> No
 def working(what: str) -> Iterator[Callable[[str], None]]:
     """A spinner beside `what`, or what it is told later, on a terminal; a line for every kernel that is compiled."""
     if not err.is_terminal:
-        with notes.telling(line):
+        with progress.reporting_to(line):
             yield lambda _: None
         return
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-    with Progress(*columns, console=err, transient=True) as progress, notes.telling(line):
-        task = progress.add_task(what, total=None)
-        yield lambda now: progress.update(task, description=now)
+    with Progress(*columns, console=err, transient=True) as shown, progress.reporting_to(line):
+        task = shown.add_task(what, total=None)
+        yield lambda now: shown.update(task, description=now)
 
 
 def line(text: str) -> None:
@@ -67,7 +67,7 @@ def compile_for(engine: str, lanes: Iterable[int], *scenes: Scene) -> None:
 
             warm_for(scenes, lanes, line)
 
-        notes.before_models(compile_all)
+        progress.before_first_model(compile_all)
 
 
 class FittingTable(Table):

@@ -12,7 +12,7 @@ from types import TracebackType
 from typing import Self
 
 import numpy as np
-from shoal.mechanics import notes
+from shoal.compile import progress
 from shoal.trajectory import Status
 
 from shoal_validation.nightly.measure import Measured, attempt
@@ -82,7 +82,7 @@ def _serve(pipe: Connection) -> None:
         except EOFError:
             return
         try:
-            with notes.telling(lambda line: print(line, file=sys.stderr, flush=True)):  # noqa: T201 - progress
+            with progress.reporting_to(lambda line: print(line, file=sys.stderr, flush=True)):  # noqa: T201 - progress
                 found = attempt(run)
         except Exception as error:
             # A defect in one line is its result, not the end of the night.

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from shoal.compile import clock
 from shoal.errors import InputError
 from shoal.identification.deadline import TimeIsUp
 from shoal.identification.forward import ForwardModel
@@ -23,7 +24,6 @@ from shoal.identification.spread.density import Density, density
 from shoal.identification.spread.uncertainty import LEVEL, Linearisation
 from shoal.identification.spread.value import Value
 from shoal.identification.spread.walkers import ENSEMBLES, Independent, possible, sampler, weights
-from shoal.mechanics import clock
 from shoal.trajectory import Array, plain
 
 if TYPE_CHECKING:

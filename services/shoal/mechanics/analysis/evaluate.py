@@ -16,12 +16,12 @@ import scipy.sparse
 
 from shoal.mechanics import forces, functions, plane
 from shoal.mechanics.affine import Affine
-from shoal.mechanics.analysis import kernels, stored
+from shoal.mechanics.analysis import evaluations, stored
 from shoal.mechanics.analysis.load_stiffness import driven, in_plane, in_space, of_drives
 from shoal.mechanics.assembly.build import build
 from shoal.mechanics.dynamics import derived_rows, work_space
 from shoal.mechanics.elements.families import KERNELS
-from shoal.mechanics.gates import ready
+from shoal.mechanics.kernels import ready
 from shoal.mechanics.model import Arrays, Model
 from shoal.mechanics.numerics import sparse
 from shoal.mechanics.numerics.tile import SINGLE, Array, Index
@@ -134,7 +134,7 @@ class Evaluator:
     def remember(self, q: Array) -> None:
         """Count the turns of angle forces after a move of less than half a turn to q."""
         self._enter(q, None)
-        kernels.remember(SINGLE, self._arrays, self._room)
+        evaluations.remember(SINGLE, self._arrays, self._room)
 
     def at(self, q: Array, v: Array | None = None, t: float = 0.0, *, load: float = 1.0) -> Evaluation:
         """Look at the state q, v (default: at rest) at time t [s]; `load` scales gravity and applied loads."""
@@ -143,18 +143,18 @@ class Evaluator:
         held = arrays.constraints
         gap, rate, bias = (np.zeros(held.size) for _ in range(3))
         entries = np.zeros(len(held.column))
-        kernels.look(SINGLE, arrays, room, t, gap, rate, bias, entries)
+        evaluations.look(SINGLE, arrays, room, t, gap, rate, bias, entries)
         force = room.a[:n].copy()
         kinetic, strain, gravity = (float(part) for part in room.energy[:3])
         applied = self._applied(arrays, t)
-        kernels.elastic(SINGLE, arrays, room)
+        evaluations.elastic(SINGLE, arrays, room)
         jacobian = Sparse((entries, held.column, held.entry), shape=(held.size, n))
         return Evaluation(force, room.a[:n].copy(), gap, rate, bias, jacobian, kinetic, strain, gravity, applied)
 
     def acceleration(self, q: Array, v: Array, t: float = 0.0) -> Array:
         """The acceleration by Gauss's principle, (unknowns,)."""
         self._enter(q, v)
-        kernels.accelerate(SINGLE, self._arrays, self._room, t, self.model.scene.solver.rank_tolerance)
+        evaluations.accelerate(SINGLE, self._arrays, self._room, t, self.model.scene.solver.rank_tolerance)
         return self._room.a[: self.model.unknowns].copy()
 
     def along(self, way: Array, sample: Index, v: Array, times: Array) -> tuple[Array, Array]:
@@ -166,7 +166,7 @@ class Evaluator:
         a, turns = np.empty_like(v), np.empty((len(v), len(self._room.memory)))
         self._enter(way[0], None)
         tolerance = self.model.scene.solver.rank_tolerance
-        kernels.along(SINGLE, self._arrays, self._room, way, sample, v, times, tolerance, a, turns)
+        evaluations.along(SINGLE, self._arrays, self._room, way, sample, v, times, tolerance, a, turns)
         return a, turns
 
     def stored(self, way: Array, turns: Array) -> Array:
@@ -270,7 +270,7 @@ class Evaluator:
         self._enter(q, v)
         gap, rate, bias = (np.zeros(arrays.constraints.size) for _ in range(3))
         entries = np.zeros(len(arrays.constraints.column))
-        kernels.look(SINGLE, arrays, self._room, t, gap, rate, bias, entries)
+        evaluations.look(SINGLE, arrays, self._room, t, gap, rate, bias, entries)
         return self._room.a[: self.model.unknowns].copy()
 
     def _energy(self, q: Array, arrays: Arrays) -> float:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from numba import njit
 
-from shoal.mechanics import gates
+from shoal.compile.pointers import raw
+from shoal.mechanics import kernels
 from shoal.mechanics.derived import derive
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.model import Arrays
-from shoal.mechanics.numerics.pointers import raw
 from shoal.mechanics.numerics.tile import Array, Tile
 
 
@@ -16,10 +16,10 @@ from shoal.mechanics.numerics.tile import Array, Tile
 def stored(tile: Tile, arrays: Arrays, room: Work, way: Array, turns: Array, energy: Array) -> None:
     """Strain energies [J] of poses, whose angle forces have counted some turns."""
     m, w = raw(arrays), raw(room)
-    gates.enter(m, w)
+    kernels.enter(m, w)
     for k in range(len(way)):
         room.z[: m.unknowns] = way[k]
         room.memory[:] = turns[k]
         derive(tile, m.derived, w.z, m.unknowns, m.rows, False)
-        gates.energies(tile, m, w)
+        kernels.energies(tile, m, w)
         energy[k] = room.energy[1]

@@ -11,10 +11,10 @@ from typing import Any
 from numba import njit
 from numba.extending import overload
 
+from shoal.compile import simd
+from shoal.compile.pointers import shift
+from shoal.compile.simd import EIGHT
 from shoal.mechanics.elements.families import PLAN, Family
-from shoal.mechanics.numerics import simd
-from shoal.mechanics.numerics.pointers import shift
-from shoal.mechanics.numerics.simd import EIGHT
 from shoal.mechanics.numerics.tile import Array, Tile
 
 REST, VARIANT, TOGETHER = 2, 3, 4

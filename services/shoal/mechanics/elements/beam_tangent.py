@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from numba import njit
 
+from shoal.compile.simd import EIGHT, load, root, spread, store
 from shoal.mechanics.elements import beam
 from shoal.mechanics.elements.batch import coefficient, put, rest, together
 from shoal.mechanics.elements.families import PLAN, Family
 from shoal.mechanics.elements.nodal import gather, part_of
-from shoal.mechanics.numerics.simd import EIGHT, load, root, spread, store
 from shoal.mechanics.numerics.tile import Array, Tile
 
 # Vectors of the work space: one of `batch`; scaled vectors; factors of nodal vectors; blocks (a_i, d_i) H (a_j, d_j);

@@ -20,13 +20,13 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from shoal.compile.pointers import shift
+from shoal.compile.simd import EIGHT, inverse_root, reciprocal, spread
 from shoal.errors import InputError
 from shoal.mechanics.elements import beam, beam_tangent
 from shoal.mechanics.elements.batch import VARIANT, add_rows, add_sum, coefficient, coordinate, of_one_variant
 from shoal.mechanics.elements.families import PLAN, Entry, Family, Kernel, implement
 from shoal.mechanics.elements.strain import bend, reference
-from shoal.mechanics.numerics.pointers import shift
-from shoal.mechanics.numerics.simd import EIGHT, inverse_root, reciprocal, spread
 from shoal.mechanics.numerics.tile import Array, Number, Tile
 from shoal.scene import Rod
 from shoal.scene.sections import Section

@@ -23,6 +23,8 @@ from dataclasses import replace
 import numpy as np
 from numba import njit
 
+from shoal.compile.pointers import pointer, shift
+from shoal.compile.simd import EIGHT, load, root, spread, store
 from shoal.mechanics.elements import beam
 from shoal.mechanics.elements.batch import VARIANT, add_rows, add_sum, coefficient, coordinate, put, rest, together
 from shoal.mechanics.elements.director_strains import AXIAL, BENDING, STRAINS, gradient, strains
@@ -30,8 +32,6 @@ from shoal.mechanics.elements.element import Element
 from shoal.mechanics.elements.families import PLAN, Entry, Family, Kernel, implement
 from shoal.mechanics.elements.hermite import curve
 from shoal.mechanics.elements.unstrained import unstrained
-from shoal.mechanics.numerics.pointers import pointer, shift
-from shoal.mechanics.numerics.simd import EIGHT, load, root, spread, store
 from shoal.mechanics.numerics.tile import Array, Number, Tile
 from shoal.mechanics.numerics.tuples import dot, plus, times
 from shoal.scene import Rod

@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from shoal.compile.simd import inverse_root, reciprocal
 from shoal.mechanics.elements.hermite import collect, curve
 from shoal.mechanics.numerics.arc import arctangent, turn
-from shoal.mechanics.numerics.simd import inverse_root, reciprocal
 from shoal.mechanics.numerics.triples import across, cross
 from shoal.mechanics.numerics.tuples import dot, plus, times
 

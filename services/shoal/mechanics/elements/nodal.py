@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from numba import njit
 
+from shoal.compile.simd import EIGHT, spread, store
 from shoal.mechanics.elements.batch import coordinate
-from shoal.mechanics.numerics.simd import EIGHT, spread, store
 
 
 @njit(error_model="numpy", forceinline=True)

@@ -10,6 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from shoal.compile.pointers import shift
+from shoal.compile.simd import EIGHT, inverse_root, reciprocal, root, spread
 from shoal.mechanics import plane
 from shoal.mechanics.elements import beam, beam_tangent
 from shoal.mechanics.elements.batch import (
@@ -24,8 +26,6 @@ from shoal.mechanics.elements.batch import (
 )
 from shoal.mechanics.elements.families import PLAN, Entry, Family, Kernel, implement
 from shoal.mechanics.elements.strain import bend, reference, stretch
-from shoal.mechanics.numerics.pointers import shift
-from shoal.mechanics.numerics.simd import EIGHT, inverse_root, reciprocal, root, spread
 from shoal.mechanics.numerics.tile import Array, Number, Tile
 from shoal.scene import Rod
 from shoal.scene.sections import Section

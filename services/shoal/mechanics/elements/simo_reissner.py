@@ -19,6 +19,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from shoal.compile.pointers import shift
+from shoal.compile.simd import EIGHT, load, spread, store
 from shoal.mechanics.elements import beam
 from shoal.mechanics.elements.batch import VARIANT, add_rows, add_sum, coefficient, coordinate, put, rest, together
 from shoal.mechanics.elements.element import Element
@@ -33,8 +35,6 @@ from shoal.mechanics.elements.simo_reissner_strains import (
     rates,
     strains,
 )
-from shoal.mechanics.numerics.pointers import shift
-from shoal.mechanics.numerics.simd import EIGHT, load, spread, store
 from shoal.mechanics.numerics.tile import Array, Number, Tile
 from shoal.scene import Rod
 from shoal.scene.sections import Section

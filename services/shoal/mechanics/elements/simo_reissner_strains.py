@@ -16,10 +16,10 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from shoal.compile.simd import heaviside, inverse_root, reciprocal
 from shoal.mechanics.elements.hermite import collect, curve
 from shoal.mechanics.numerics.arc import arctangent
 from shoal.mechanics.numerics.pairs import cross, quarter
-from shoal.mechanics.numerics.simd import heaviside, inverse_root, reciprocal
 from shoal.mechanics.numerics.tuples import dot, plus, times
 
 STRAINS = 8

@@ -24,14 +24,14 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from shoal.compile.pointers import shift
+from shoal.compile.simd import EIGHT, load, root, spread, store
 from shoal.errors import InputError
 from shoal.mechanics.elements import beam
 from shoal.mechanics.elements.batch import add_sum, coefficient, put, together
 from shoal.mechanics.elements.element import Element
 from shoal.mechanics.elements.families import PLAN, Entry, Family
 from shoal.mechanics.elements.nodal import gather, part_of
-from shoal.mechanics.numerics.pointers import shift
-from shoal.mechanics.numerics.simd import EIGHT, load, root, spread, store
 from shoal.mechanics.numerics.tile import Array, Number, Tile
 from shoal.scene import Rod
 from shoal.scene.sections import Section

@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from shoal.compile.simd import EIGHT, inverse_root, reciprocal, spread
 from shoal.errors import InputError
 from shoal.mechanics.elements import beam, spatial
 from shoal.mechanics.elements.batch import VARIANT, add_rows, add_sum, coefficient, coordinate, of_one_variant
@@ -18,7 +19,6 @@ from shoal.mechanics.elements.cubic import FULL_RULE, REDUCED_RULE
 from shoal.mechanics.elements.families import PLAN, Entry, Family, Kernel, implement
 from shoal.mechanics.elements.spatial import bend
 from shoal.mechanics.elements.strain import stretch
-from shoal.mechanics.numerics.simd import EIGHT, inverse_root, reciprocal, spread
 from shoal.mechanics.numerics.tile import Array, Number, Tile
 from shoal.scene import Rod
 from shoal.scene.sections import Section

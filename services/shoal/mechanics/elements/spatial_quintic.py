@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from shoal.compile.simd import EIGHT, inverse_root, reciprocal, spread
 from shoal.mechanics.elements import beam, spatial
 from shoal.mechanics.elements.batch import VARIANT, add_rows, add_sum, coefficient, of_one_variant
 from shoal.mechanics.elements.families import PLAN, Entry, Family, Kernel, implement
 from shoal.mechanics.elements.quintic import at_both, collect, component, nodal, recommended
 from shoal.mechanics.elements.spatial import bend
 from shoal.mechanics.elements.strain import stretch
-from shoal.mechanics.numerics.simd import EIGHT, inverse_root, reciprocal, spread
 from shoal.mechanics.numerics.tile import Array, Number, Tile
 from shoal.scene import Rod
 from shoal.scene.sections import Section

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from numba import njit
 
+from shoal.compile.simd import EIGHT, spread
 from shoal.mechanics.elements.batch import rest
-from shoal.mechanics.numerics.simd import EIGHT, spread
 
 
 @njit(error_model="numpy", forceinline=True)

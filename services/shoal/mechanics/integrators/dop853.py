@@ -11,14 +11,14 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from shoal.mechanics import gates
+from shoal.compile.pointers import raw
+from shoal.mechanics import kernels
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.integrators import control
 from shoal.mechanics.integrators.control import RESOLUTION, Control, control_room
 from shoal.mechanics.integrators.dop853_tableau import DENSE, ERROR_3, ERROR_5, INSTANTS, STAGES, WEIGHTS
 from shoal.mechanics.integrators.scheme import Facts, implement
 from shoal.mechanics.model import Arrays, Model
-from shoal.mechanics.numerics.pointers import raw
 from shoal.mechanics.numerics.tile import Array, Tile
 from shoal.scene import Solver
 
@@ -125,7 +125,7 @@ def step(tile: Tile, scheme: Dop853, m: Arrays, w: Work, t: float, h: float) -> 
     while True:
         for number in range(1, STAGES):
             _stage(tile, room, m, w, h, number, w.z, w.zdot)
-            gates.acceleration(
+            kernels.acceleration(
                 tile, m, w, t + INSTANTS[number] * h, w.z, w.zdot, room.rank_tolerance, w.a
             )  # fmt: skip
             _keep(tile, room, m, number, w.zdot, w.a)
@@ -143,8 +143,8 @@ def step(tile: Tile, scheme: Dop853, m: Arrays, w: Work, t: float, h: float) -> 
                 return rest
             h = control.first_trial(c, rest)
     control.accept(c, error, h, ORDER_OF_ERROR, rejected)
-    gates.settle(tile, m, w, t + h, room.rank_tolerance)
-    gates.acceleration(tile, m, w, t + h, w.z, w.zdot, room.rank_tolerance, w.a)
+    kernels.settle(tile, m, w, t + h, room.rank_tolerance)
+    kernels.acceleration(tile, m, w, t + h, w.z, w.zdot, room.rank_tolerance, w.a)
     room.evaluations[0] += 1
     return h
 
@@ -163,7 +163,7 @@ def inside(tile: Tile, scheme: Dop853, m: Arrays, w: Work, past: Array, x: float
         for number in range(STAGES + 1, 16):
             _stage(tile, room, m, w, h, number, q_, v_)
             instant = room.begin[0] + INSTANTS[number] * h
-            gates.acceleration(tile, m, w, instant, q_, v_, room.rank_tolerance, a_)
+            kernels.acceleration(tile, m, w, instant, q_, v_, room.rank_tolerance, a_)
             _keep(tile, room, m, number, v_, a_)
     for i in range(end):
         q[i] = w.before[i] + _dense(end, i, slope_q, w.z[i] - w.before[i], x, h)

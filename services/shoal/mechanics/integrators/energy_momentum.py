@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from shoal.mechanics import constraints, dynamics, gates
+from shoal.compile.pointers import raw
+from shoal.mechanics import constraints, dynamics, kernels
 from shoal.mechanics.derived import derive
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.functions import evaluate
@@ -21,7 +22,6 @@ from shoal.mechanics.integrators.dense import cubic
 from shoal.mechanics.integrators.newton import Newton, newton_room
 from shoal.mechanics.integrators.scheme import Facts, implement
 from shoal.mechanics.model import Arrays, Model
-from shoal.mechanics.numerics.pointers import raw
 from shoal.mechanics.numerics.tile import Array, Tile
 from shoal.scene import Solver
 
@@ -71,11 +71,11 @@ def mean_force(tile: Tile, scheme: EnergyMomentum, m: Arrays, w: Work, t: float,
     end = m.unknowns * width
     middle, change = scheme.middle, scheme.change
     _halve(tile, scheme, m, w)
-    gates.elastic_force(tile, m, w, middle, f, True)
+    kernels.elastic_force(tile, m, w, middle, f, True)
     derive(tile, m.derived, w.before, m.unknowns, m.force_rows, False)
     derive(tile, m.derived, w.z, m.unknowns, m.force_rows, False)
     dynamics.add_mean_force(tile, m, w, w.before, w.z, f)
-    gates.energies(tile, m, w)
+    kernels.energies(tile, m, w)
     dynamics.multiply_mass(tile, m, change, w.stage)
     for lane in range(width):
         work, square = 0.0, 0.0
@@ -91,11 +91,11 @@ def mean_force(tile: Tile, scheme: EnergyMomentum, m: Arrays, w: Work, t: float,
     # What has no potential acts as it does half-way: the whole force less its elastic part.
     for i in range(end):
         change[i] /= h
-    gates.force(tile, m, w, t + 0.5 * h, middle, change, w.stage)
+    kernels.force(tile, m, w, t + 0.5 * h, middle, change, w.stage)
     for i in range(end):
         change[i] *= h
         f[i] += w.stage[i]
-    gates.elastic_force(tile, m, w, middle, w.stage, False)
+    kernels.elastic_force(tile, m, w, middle, w.stage, False)
     for i in range(end):
         f[i] -= w.stage[i]
 
@@ -116,7 +116,7 @@ def step(tile: Tile, scheme: EnergyMomentum, m: Arrays, w: Work, t: float, h: fl
     room = raw(scheme)
     residual, change = room.newton.residual, room.change
     guess.start(tile, m, room.newton.guess, w.z, h)
-    gates.energies(tile, m, w)
+    kernels.energies(tile, m, w)
     for lane in range(width):
         room.elastic[lane] = w.energy[width + lane]
     for i in range(end):
@@ -150,12 +150,12 @@ def step(tile: Tile, scheme: EnergyMomentum, m: Arrays, w: Work, t: float, h: fl
     for i in range(end):
         w.zdot[i] = 2.0 * (w.z[i] - w.before[i]) / h - w.zdot[i]
     room.evaluations[0] += iterations + 1
-    gates.acceleration(tile, m, w, t + h, w.z, w.zdot, room.newton.rank_tolerance, w.a)
+    kernels.acceleration(tile, m, w, t + h, w.z, w.zdot, room.newton.rank_tolerance, w.a)
     if dynamics.loaded(m):
         _halve(tile, room, m, w)
         for i in range(end):
             change[i] /= h
-        gates.force(tile, m, w, t + 0.5 * h, room.middle, change, w.stage)
+        kernels.force(tile, m, w, t + 0.5 * h, room.middle, change, w.stage)
         if m.driven:
             _count_drives(tile, m, w, room.newton, t, h)
     return h

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from shoal.compile.pointers import raw
 from shoal.mechanics import dynamics
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.integrators import guess, newton
@@ -21,7 +22,6 @@ from shoal.mechanics.integrators.newton import Newton, newton_room
 from shoal.mechanics.integrators.scheme import Facts, implement
 from shoal.mechanics.least import drift
 from shoal.mechanics.model import Arrays, Model
-from shoal.mechanics.numerics.pointers import raw
 from shoal.mechanics.numerics.tile import Array, Tile
 from shoal.scene import Solver
 

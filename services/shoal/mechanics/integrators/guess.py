@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from shoal.compile.pointers import shift
+from shoal.compile.simd import add_scaled, assign
 from shoal.mechanics.model import Arrays, Model
-from shoal.mechanics.numerics.pointers import shift
-from shoal.mechanics.numerics.simd import add_scaled, assign
 from shoal.mechanics.numerics.tile import Array, Tile
 
 DEGREE = 3

@@ -15,7 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from shoal.mechanics import dynamics, gates
+from shoal.compile.pointers import raw
+from shoal.mechanics import dynamics, kernels
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.functions import evaluate
 from shoal.mechanics.integrators import guess, newton
@@ -23,7 +24,6 @@ from shoal.mechanics.integrators.dense import cubic
 from shoal.mechanics.integrators.newton import Newton, newton_room
 from shoal.mechanics.integrators.scheme import Facts, implement
 from shoal.mechanics.model import Arrays, Model
-from shoal.mechanics.numerics.pointers import raw
 from shoal.mechanics.numerics.tile import Array, Tile
 from shoal.scene import Solver
 
@@ -69,7 +69,7 @@ def step(tile: Tile, scheme: ImplicitGauss, m: Arrays, w: Work, t: float, h: flo
     if dynamics.loaded(m):
         for i in range(end):
             w.before[i] = 0.5 * (w.before[i] + w.zdot[i])
-        gates.force(tile, m, w, t + h, w.z, w.before, w.stage)
+        kernels.force(tile, m, w, t + h, w.z, w.before, w.stage)
         if m.driven:
             _count_drives(tile, scheme, m, w, t, h)
     return h

@@ -11,11 +11,11 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from shoal.mechanics import dynamics, gates
+from shoal.compile.simd import EIGHT, add_scaled, add_to, assign, load, store
+from shoal.mechanics import dynamics, kernels
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.integrators.scheme import Facts, implement
 from shoal.mechanics.model import Arrays, Model
-from shoal.mechanics.numerics.simd import EIGHT, add_scaled, add_to, assign, load, store
 from shoal.mechanics.numerics.tile import Array, Tile
 from shoal.scene import Solver
 
@@ -67,12 +67,12 @@ def step(tile: Tile, scheme: Leapfrog, m: Arrays, w: Work, t: float, h: float) -
     if m.constraints.size > 0 or dynamics.loaded(m):
         assign(w.stage, w.zdot, end)
         add_scaled(w.zdot, 0.5 * h, w.a, end)
-        gates.acceleration(tile, m, w, t + h, w.z, w.zdot, scheme.rank_tolerance, w.a)
+        kernels.acceleration(tile, m, w, t + h, w.z, w.zdot, scheme.rank_tolerance, w.a)
         assign(w.zdot, w.stage, end)
         add_scaled(w.zdot, 0.5 * h, w.a, end)
-        gates.settle(tile, m, w, t + h, scheme.rank_tolerance, found=True)
+        kernels.settle(tile, m, w, t + h, scheme.rank_tolerance, found=True)
     else:
-        gates.acceleration(tile, m, w, t + h, w.z, w.zdot, scheme.rank_tolerance, w.a)
+        kernels.acceleration(tile, m, w, t + h, w.z, w.zdot, scheme.rank_tolerance, w.a)
         add_scaled(w.zdot, 0.5 * h, w.a, end)
     return h
 

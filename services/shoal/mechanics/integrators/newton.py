@@ -13,7 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from shoal.mechanics import constraints, dynamics, gates, saddle
+from shoal.compile.pointers import shift
+from shoal.compile.simd import add_scaled, assign
+from shoal.compile.vector import add, clear, copy, subtract
+from shoal.mechanics import constraints, dynamics, kernels, saddle
 from shoal.mechanics import tangent as tangents
 from shoal.mechanics.derived import derive
 from shoal.mechanics.dynamics import Work
@@ -21,10 +24,7 @@ from shoal.mechanics.integrators import guess
 from shoal.mechanics.integrators.guess import Guess, guess_room
 from shoal.mechanics.model import Arrays, Model
 from shoal.mechanics.numerics import sparse
-from shoal.mechanics.numerics.pointers import shift
-from shoal.mechanics.numerics.simd import add_scaled, assign
 from shoal.mechanics.numerics.tile import Array, Tile
-from shoal.mechanics.numerics.vector import add, clear, copy, subtract
 from shoal.mechanics.tangent import Tangent, tangent_tile
 from shoal.scene import Solver
 
@@ -268,7 +268,7 @@ def solve(tile: Tile, m: Arrays, w: Work, newton: Newton, t: float, mass_factor:
     begin(tile, m, w, newton, mass_factor, damping_factor, True)
     while iterations < limit:
         iterations += 1
-        gates.force(tile, m, w, t, w.z, w.zdot, residual)
+        kernels.force(tile, m, w, t, w.z, w.zdot, residual)
         dynamics.multiply_mass(tile, m, w.a, w.stage)
         add_scaled(residual, -1.0, w.stage, end)
         add_reactions(tile, m, w, newton, w.z)
@@ -294,6 +294,6 @@ def take_power(tile: Tile, m: Arrays, w: Work, newton: Newton, t: float) -> None
     """
     if dynamics.loaded(m):
         t = dynamics.instant(w, t)
-        gates.force(tile, m, w, t, w.z, w.zdot, w.stage)
+        kernels.force(tile, m, w, t, w.z, w.zdot, w.stage)
         if m.driven:
             constraints.add_power(tile, m.constraints, m.functions, t, newton.multiplier, w.power)

@@ -17,7 +17,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from shoal.mechanics import dynamics, gates
+from shoal.compile.pointers import raw
+from shoal.compile.vector import clear
+from shoal.mechanics import dynamics, kernels
 from shoal.mechanics import tangent as tangents
 from shoal.mechanics.derived import derive
 from shoal.mechanics.dynamics import Work
@@ -28,9 +30,7 @@ from shoal.mechanics.integrators.scheme import Facts, implement
 from shoal.mechanics.least import implicit
 from shoal.mechanics.model import Arrays, Model
 from shoal.mechanics.numerics import sparse
-from shoal.mechanics.numerics.pointers import raw
 from shoal.mechanics.numerics.tile import Array, Tile
-from shoal.mechanics.numerics.vector import clear
 from shoal.mechanics.tangent import Tangent, tangent_tile
 from shoal.scene import Solver
 
@@ -207,7 +207,7 @@ def _evaluate(tile: Tile, scheme: Radau5, m: Arrays, w: Work, t: float, h: float
     for s in range(STAGES):
         for i in range(end):
             w.z[i], w.zdot[i] = q[s * end + i], v[s * end + i]
-        gates.acceleration(tile, m, w, t + C[s] * h, w.z, w.zdot, scheme.rank_tolerance, w.a)
+        kernels.acceleration(tile, m, w, t + C[s] * h, w.z, w.zdot, scheme.rank_tolerance, w.a)
         for i in range(end):
             a[s * end + i] = w.a[i]
     for s in range(STAGES):
@@ -354,8 +354,8 @@ def step(tile: Tile, scheme: Radau5, m: Arrays, w: Work, t: float, h: float) -> 
                 p[(k + 1) * end + i] += RATES[k, s] * (room.stage_v[s * end + i] - w.before[end + i])
         w.z[i], w.zdot[i] = room.stage_q[2 * end + i], room.stage_v[2 * end + i]
     room.last[0] = trial
-    gates.settle(tile, m, w, t + trial, room.rank_tolerance)
-    gates.acceleration(tile, m, w, t + trial, w.z, w.zdot, room.rank_tolerance, w.a)
+    kernels.settle(tile, m, w, t + trial, room.rank_tolerance)
+    kernels.acceleration(tile, m, w, t + trial, w.z, w.zdot, room.rank_tolerance, w.a)
     room.evaluations[0] += 1
     return trial
 

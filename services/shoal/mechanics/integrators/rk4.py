@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from shoal.mechanics import gates
+from shoal.mechanics import kernels
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.integrators.scheme import Facts, implement
 from shoal.mechanics.model import Arrays, Model
@@ -56,15 +56,15 @@ def step(tile: Tile, scheme: Rk4, m: Arrays, w: Work, t: float, h: float) -> flo
         for i in range(end):
             w.z[i] = w.stage[i] + part * w.zdot[i]
             w.zdot[i] = w.stage[v + i] + part * w.a[i]
-        gates.acceleration(tile, m, w, t + part, w.z, w.zdot, scheme.rank_tolerance, w.a)
+        kernels.acceleration(tile, m, w, t + part, w.z, w.zdot, scheme.rank_tolerance, w.a)
         for i in range(end):
             w.stage[q_sum + i] += weight * w.zdot[i]
             w.stage[v_sum + i] += weight * w.a[i]
     for i in range(end):
         w.z[i] = w.stage[i] + h / 6.0 * w.stage[q_sum + i]
         w.zdot[i] = w.stage[v + i] + h / 6.0 * w.stage[v_sum + i]
-    gates.settle(tile, m, w, t + h, scheme.rank_tolerance)
-    gates.acceleration(tile, m, w, t + h, w.z, w.zdot, scheme.rank_tolerance, w.a)
+    kernels.settle(tile, m, w, t + h, scheme.rank_tolerance)
+    kernels.acceleration(tile, m, w, t + h, w.z, w.zdot, scheme.rank_tolerance, w.a)
     return h
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from shoal.mechanics import constraints, dynamics, gates
+from shoal.mechanics import constraints, dynamics, kernels
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.integrators.dense import cubic
 from shoal.mechanics.integrators.scheme import Facts, implement
@@ -50,15 +50,15 @@ def step(tile: Tile, scheme: SemiImplicitEuler, m: Arrays, w: Work, t: float, h:
         # The force at the beginning acts on the mean rates.
         for i in range(end):
             w.before[i] = w.zdot[i] + 0.5 * h * w.a[i]
-        gates.force(tile, m, w, t, w.z, w.before, w.stage)
+        kernels.force(tile, m, w, t, w.z, w.before, w.stage)
         for lane in range(width):
             scheme.power[lane] = w.power[lane]
         _add_drives(tile, scheme, m, w, t)
     for i in range(end):
         w.zdot[i] += h * w.a[i]
         w.z[i] += h * w.zdot[i]
-    gates.settle(tile, m, w, t + h, scheme.rank_tolerance)
-    gates.acceleration(tile, m, w, t + h, w.z, w.zdot, scheme.rank_tolerance, w.a)
+    kernels.settle(tile, m, w, t + h, scheme.rank_tolerance)
+    kernels.acceleration(tile, m, w, t + h, w.z, w.zdot, scheme.rank_tolerance, w.a)
     if dynamics.loaded(m):
         _add_drives(tile, scheme, m, w, t + h)
         for lane in range(width):

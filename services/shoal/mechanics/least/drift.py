@@ -9,15 +9,15 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from shoal.compile.simd import EIGHT
+from shoal.compile.vector import clear
 from shoal.mechanics import constraints, saddle
 from shoal.mechanics.derived import derive
 from shoal.mechanics.least import lent, many, projection, together
 from shoal.mechanics.least.work import GaussWork, lane_work, load_lane, rows
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics import sparse
-from shoal.mechanics.numerics.simd import EIGHT
 from shoal.mechanics.numerics.tile import Array, Tile
-from shoal.mechanics.numerics.vector import clear
 
 SETTLING = 100.0
 """Drift is removed along fewer directions than accelerations are held: those this much farther from singular."""

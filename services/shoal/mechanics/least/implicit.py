@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from shoal.compile.vector import clear, copy, subtract_product
 from shoal.mechanics import constraints
 from shoal.mechanics.derived import derive
 from shoal.mechanics.least.work import GaussWork
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics import sparse
 from shoal.mechanics.numerics.tile import Array, Tile
-from shoal.mechanics.numerics.vector import clear, copy, subtract_product
 
 
 @njit(cache=True, error_model="numpy")

@@ -12,11 +12,11 @@ from __future__ import annotations
 
 from numba import njit
 
+from shoal.compile.simd import EIGHT
 from shoal.mechanics.least import alternatives, projection, together
 from shoal.mechanics.least.work import GaussWork, LaneWork
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics import sparse
-from shoal.mechanics.numerics.simd import EIGHT
 from shoal.mechanics.numerics.tile import Array, Tile
 
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from shoal.compile.pointers import pointer
+from shoal.compile.vector import add, clear, copy, subtract
 from shoal.mechanics import constraints, functions, saddle
 from shoal.mechanics.constraints import Constraints
 from shoal.mechanics.least.projection import NOTHING, dot
 from shoal.mechanics.least.work import GaussWork
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics import sparse
-from shoal.mechanics.numerics.pointers import pointer
 from shoal.mechanics.numerics.tile import Array, Tile
-from shoal.mechanics.numerics.vector import add, clear, copy, subtract
 
 STILL = 1e-9
 """A third derivative below this part of what its velocities could make it is none."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from numba import njit
 
+from shoal.compile.simd import EIGHT
 from shoal.errors import InputError
 from shoal.mechanics import constraints
 from shoal.mechanics.derived import derive
@@ -15,7 +16,6 @@ from shoal.mechanics.least import alternatives, branch, lent, many, projection, 
 from shoal.mechanics.least.work import HERE, PASSED, GaussWork, lane_work, load_lane, rows
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics import sparse
-from shoal.mechanics.numerics.simd import EIGHT
 from shoal.mechanics.numerics.tile import Array, Tile
 
 LEAVING = 3.0
@@ -31,7 +31,7 @@ METHODS = {
     "proximal": alternatives.PROXIMAL,
     "baumgarte": BAUMGARTE,
 }
-"""Ways to the acceleration, unless somebody else seeks it; see `gates.Seek`."""
+"""Ways to the acceleration, unless somebody else seeks it; see `kernels.Seek`."""
 
 
 def method(name: str) -> int:

@@ -12,9 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
+from shoal.compile.simd import EIGHT, heaviside, larger, least, load, root, spread, store
 from shoal.mechanics.constraints import Constraints
 from shoal.mechanics.least.projection import NOTHING, TIE
-from shoal.mechanics.numerics.simd import EIGHT, heaviside, larger, least, load, root, spread, store
 from shoal.mechanics.numerics.tile import Array, Index
 
 APART = 1e-3

@@ -7,13 +7,13 @@ from typing import NamedTuple
 import numpy as np
 from numba import carray, njit
 
+from shoal.compile.vector import clear, copy
 from shoal.mechanics import saddle
 from shoal.mechanics.least import together
 from shoal.mechanics.least.together import GroupWork
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics import sparse
 from shoal.mechanics.numerics.tile import Array, Index, Tile
-from shoal.mechanics.numerics.vector import clear, copy
 from shoal.mechanics.saddle import SaddleWork
 
 HERE, PASSED = 1.0, 2.0

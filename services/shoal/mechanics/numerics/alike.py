@@ -13,10 +13,11 @@ import numpy as np
 from numba import njit
 from numba.extending import overload
 
-from shoal.mechanics.numerics import row_pairs, simd, sparse
-from shoal.mechanics.numerics.pointers import shift
+from shoal.compile import simd
+from shoal.compile.pointers import shift
+from shoal.compile.simd import EIGHT
+from shoal.mechanics.numerics import row_pairs, sparse
 from shoal.mechanics.numerics.row_pairs import RowPairs
-from shoal.mechanics.numerics.simd import EIGHT
 from shoal.mechanics.numerics.tile import Array, Tile
 
 FEW = 32

@@ -7,7 +7,7 @@ from math import factorial
 import numpy as np
 from numba import njit
 
-from shoal.mechanics.numerics.simd import inverse_root, reciprocal
+from shoal.compile.simd import inverse_root, reciprocal
 
 COSINE = np.array([1.0 / factorial(2 * n) for n in range(11)])
 SINE = np.array([1.0 / factorial(2 * n + 1) for n in range(11)])

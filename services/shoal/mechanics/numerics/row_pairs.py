@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from shoal.mechanics.numerics.simd import load, store
+from shoal.compile.simd import load, store
 from shoal.mechanics.numerics.sparse import Pattern
 from shoal.mechanics.numerics.tile import Array, Index, Tile
 

@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numba import njit
 
-from shoal.mechanics.numerics import simd
+from shoal.compile import simd
+from shoal.compile.vector import add_product, copy, scale, subtract_dot
 from shoal.mechanics.numerics.tile import Array, Index, Tile
-from shoal.mechanics.numerics.vector import add_product, copy, scale, subtract_dot
 
 if TYPE_CHECKING:
     import scipy.sparse

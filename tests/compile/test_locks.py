@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numba import njit
-from shoal.mechanics import compilation, gates, notes, warm
+from shoal.compile import locks, progress
+from shoal.mechanics import kernels, warm
 from shoal.mechanics.assembly.build import build
 from shoal.mechanics.march import loop
-from shoal.mechanics.model import Gates
+from shoal.mechanics.model import FunctionTable
 from shoal.mechanics.numerics.tile import SINGLE
 from shoal.mechanics.simulate import simulate
 from shoal.mechanics.workspace import at_start
@@ -38,8 +39,8 @@ FIRST = """
 import pathlib, time
 import kernels
 from numba.core import event
-from shoal.mechanics import compilation
-compilation.watch()
+from shoal.compile import locks
+locks.install()
 class Slow(event.Listener):
     def on_start(self, event):
         pathlib.Path("begun").touch()
@@ -53,8 +54,8 @@ print(sum(kernels.kernel.stats.cache_misses.values()))
 SECOND = """
 import pathlib, time
 import kernels
-from shoal.mechanics import compilation
-compilation.watch()
+from shoal.compile import locks
+locks.install()
 while not pathlib.Path("begun").exists():
     time.sleep(0.01)
 kernels.kernel(2.0)
@@ -73,14 +74,14 @@ def test_of_two_processes_one_compiles_and_the_other_waits(tmp_path: Path) -> No
 
 
 def test_who_listens_is_told_of_a_kernel(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(compilation, "_WORTH_A_LINE", 0.0)
+    monkeypatch.setattr(locks, "_WORTH_A_LINE", 0.0)
     lines: list[str] = []
 
     @njit
     def some_kernel(x):  # type: ignore[no-untyped-def]
         return x + 1.0
 
-    with notes.telling(lines.append):
+    with progress.reporting_to(lines.append):
         some_kernel(1.0)
     some_kernel(1)
     assert len(lines) == 1
@@ -98,13 +99,13 @@ def test_what_is_compiled_ahead_is_what_a_run_calls(scene: Scene, lanes: int) ->
     simulate(scene, np.array([1e-3]), values)
     for kernel in warm.kernels(scene, lanes):
         if kernel.name != "_stiffness":
-            function = loop if kernel.name == "loop" else getattr(gates, kernel.name)
+            function = loop if kernel.name == "loop" else getattr(kernels, kernel.name)
             assert kernel.kinds in function.overloads, kernel.name
             assert kernel.cached
 
 
-def _gates(scene: Scene) -> Gates:
-    return at_start(build(scene), SINGLE, ONE)[0].gates
+def _gates(scene: Scene) -> FunctionTable:
+    return at_start(build(scene), SINGLE, ONE)[0].table
 
 
 def test_a_model_has_the_gates_that_it_calls() -> None:

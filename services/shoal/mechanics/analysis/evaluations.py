@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from numba import njit
 
-from shoal.mechanics import constraints, gates
+from shoal.compile.pointers import pointer, raw
+from shoal.mechanics import constraints, kernels
 from shoal.mechanics.derived import derive
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.dynamics import remember as count
 from shoal.mechanics.model import Arrays
-from shoal.mechanics.numerics.pointers import pointer, raw
 from shoal.mechanics.numerics.tile import Array, Index, Tile
 
 
@@ -19,11 +19,11 @@ def look(
 ) -> None:
     """Force (into room.a), energies (room.energy) and constraints of the state in `room`."""
     m, w = raw(arrays), raw(room)
-    gates.enter(m, w)
+    kernels.enter(m, w)
     derive(tile, m.derived, w.z, m.unknowns, m.rows, False)
     derive(tile, m.derived, w.zdot, m.unknowns, m.rows, True)
-    gates.force(tile, m, w, t, w.z, w.zdot, w.a)
-    gates.energies(tile, m, w)
+    kernels.force(tile, m, w, t, w.z, w.zdot, w.a)
+    kernels.energies(tile, m, w)
     constraints.residual(tile, m.constraints, m.functions, t, w.z, pointer(gap))
     constraints.rates(tile, m.constraints, m.functions, t, pointer(rate))
     constraints.bias(tile, m.constraints, m.functions, t, w.zdot, pointer(bias))
@@ -34,16 +34,16 @@ def look(
 def elastic(tile: Tile, arrays: Arrays, room: Work) -> None:
     """The elastic part of the force, into room.a."""
     m, w = raw(arrays), raw(room)
-    gates.enter(m, w)
-    gates.elastic_force(tile, m, w, w.z, w.a, False)
+    kernels.enter(m, w)
+    kernels.elastic_force(tile, m, w, w.z, w.a, False)
 
 
 @njit(cache=True, error_model="numpy")
 def accelerate(tile: Tile, arrays: Arrays, room: Work, t: float, tolerance: float) -> None:
     """The acceleration by Gauss's principle, into room.a."""
     m, w = raw(arrays), raw(room)
-    gates.enter(m, w)
-    gates.acceleration(tile, m, w, t, w.z, w.zdot, tolerance, w.a)
+    kernels.enter(m, w)
+    kernels.acceleration(tile, m, w, t, w.z, w.zdot, tolerance, w.a)
 
 
 @njit(cache=True, error_model="numpy")
@@ -68,7 +68,7 @@ def along(
 ) -> None:
     """Accelerations and the turns of angle forces at the poses of a way whose `sample` is one, not -1."""
     m, w = raw(arrays), raw(room)
-    gates.enter(m, w)
+    kernels.enter(m, w)
     for k in range(len(way)):
         room.z[: m.unknowns] = way[k]
         if k > 0:
@@ -77,5 +77,5 @@ def along(
         if n >= 0:
             room.zdot[: m.unknowns] = v[n]
             turns[n] = room.memory
-            gates.acceleration(tile, m, w, times[n], w.z, w.zdot, tolerance, w.a)
+            kernels.acceleration(tile, m, w, times[n], w.z, w.zdot, tolerance, w.a)
             a[n] = room.a[: m.unknowns]

@@ -1,4 +1,4 @@
-"""Pointers in place of arrays: they keep reference counting out of the time loop. The caller owns the memory."""
+"""Raw pointers in place of arrays, which keep reference counting out of the time loop. The caller owns the memory."""
 
 from __future__ import annotations
 
@@ -8,10 +8,13 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
+Pointer = Any
+"""A pointer to float64 in compiled code."""
+
 
 @intrinsic
 def pointer(typing_context, array):  # type: ignore[no-untyped-def]
-    """Address of an array's first entry; the array must outlive its use."""
+    """Return the address of an array's first entry; the array must outlive its use."""
     if not isinstance(array, types.Array) or array.layout != "C":
         raise TypeError(f"pointer: needs a contiguous array, found {array}")
 
@@ -23,7 +26,7 @@ def pointer(typing_context, array):  # type: ignore[no-untyped-def]
 
 @intrinsic
 def shift(typing_context, base, offset):  # type: ignore[no-untyped-def]
-    """The pointer `offset` entries further on."""
+    """Return a pointer moved on by `offset` entries."""
 
     def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
         return builder.gep(arguments[0], [arguments[1]])
@@ -33,7 +36,7 @@ def shift(typing_context, base, offset):  # type: ignore[no-untyped-def]
 
 @intrinsic
 def raw(typing_context, structure):  # type: ignore[no-untyped-def]
-    """The same structure (a tuple, named or not) with pointers in place of its arrays and of those inside its parts."""
+    """Return a structure (a tuple, named or not) with pointers in place of its arrays and of those inside its parts."""
 
     def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
         return _converted(context, builder, structure, arguments[0])
@@ -42,7 +45,7 @@ def raw(typing_context, structure):  # type: ignore[no-untyped-def]
 
 
 def raw_type(kind: Any) -> Any:
-    """The compiler's type of what `raw` makes of a structure of this type."""
+    """Return the compiler's type of the result of `raw` for a structure of this type."""
     if isinstance(kind, types.Array):
         return types.CPointer(kind.dtype)
     if isinstance(kind, types.BaseTuple):

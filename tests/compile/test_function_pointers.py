@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
-from shoal.mechanics.numerics import gate
-from shoal.mechanics.numerics.pointers import pointer, raw
+from shoal.compile import structures
+from shoal.compile.pointers import pointer, raw
 
 
 class Inner(NamedTuple):
@@ -34,8 +34,8 @@ class Outer(NamedTuple):
 
 
 @njit
-def _stored(home, structure):
-    gate.store(pointer(home), raw(structure))
+def _stored(storage, structure):
+    structures.store(pointer(storage), raw(structure))
 
 
 def test_python_lays_a_structure_as_the_compiler_does() -> None:
@@ -44,8 +44,8 @@ def test_python_lays_a_structure_as_the_compiler_does() -> None:
     structure = Outer(
         (0, 0, 0), True, inner, (1, inner, (numbers,)), (), counts, np.int64(-7), (True, True), np.float64(0.1)
     )
-    one, other = gate.home(), gate.home()
+    one, other = structures.storage(), structures.storage()
     _stored(one, structure)
-    gate.put(other, structure)
+    structures.write(other, structure)
     np.testing.assert_array_equal(one.view(np.uint8), other.view(np.uint8))
     assert np.any(one)

@@ -11,7 +11,7 @@ import numba
 import pytest
 from numba import njit, types
 from numba.core.codegen import JITCodeLibrary
-from shoal.mechanics import linking
+from shoal.compile import linking
 
 KERNELS = """
 from numba import njit
@@ -31,10 +31,10 @@ def kernel(x):
     return inner(x) + innermost(x)
 """
 RUN = """
-from shoal.mechanics import compilation
-compilation.watch()
+from shoal.compile import locks
+locks.install()
 import kernels
-from shoal.mechanics.linking import Part
+from shoal.compile.linking import Part
 print(*(kernels.{first}(2.0), kernels.{second}(2.0)))
 try:
     kernels.{first}(-1.0)
@@ -141,8 +141,8 @@ def both(x):
     return 10.0 * rise(x) + fall(x)
 """
 CALL = """
-from shoal.mechanics import compilation
-compilation.watch()
+from shoal.compile import locks
+locks.install()
 import alike
 print(alike.{name}(5.0))
 """

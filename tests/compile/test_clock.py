@@ -8,8 +8,9 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 from numba import njit
+from shoal.compile import clock, locks
 from shoal.identification.deadline import Deadline
-from shoal.mechanics import clock, compilation, warm
+from shoal.mechanics import warm
 
 
 @pytest.fixture
@@ -67,7 +68,7 @@ def test_numba_stops_it() -> None:
     def doubled(x: float) -> float:
         return 2.0 * x
 
-    compilation.watch()
+    locks.install()
     heard = list[bool]()
     with clock.heard(heard.append):
         assert doubled(2.0) == 4.0

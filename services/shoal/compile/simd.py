@@ -1,4 +1,4 @@
-"""A vector of doubles as a value in compiled code: `+ - * /`, `sqrt`, and how it comes from memory and goes back.
+"""SIMD vectors of doubles as values in compiled code: `+ - * /`, `sqrt`, loads and stores.
 
 The compiler makes vector code of a loop over lanes only if it can prove that rows do not overlap, and not through long
 formulas. Here a formula is written once for a number; given vectors, it is computed for as many lanes as they have: the
@@ -17,9 +17,9 @@ from numba.core import cgutils
 from numba.core.datamodel import models
 from numba.extending import intrinsic, overload, register_model
 
-from shoal.mechanics.numerics.tile import Array, Tile
+from shoal.compile.pointers import Pointer
 
-EIGHT: Tile = (0,) * 8
+EIGHT: tuple[int, ...] = (0,) * 8
 """The lanes of the longest vectors of today's processors."""
 _FLAGS = ("contract", "nsz")
 
@@ -55,7 +55,7 @@ def _spread(builder: Any, value: Any, count: int) -> Any:
 
 @intrinsic
 def load(typing_context, tile, base, at):  # type: ignore[no-untyped-def]
-    """As many neighbours as the tile has lanes, from entry `at` of a pointer on."""
+    """Load consecutive entries from `at` on, as many as the tile has lanes."""
     count = tile.count
 
     def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
@@ -66,7 +66,7 @@ def load(typing_context, tile, base, at):  # type: ignore[no-untyped-def]
 
 @intrinsic
 def store(typing_context, base, at, value):  # type: ignore[no-untyped-def]
-    """Write a vector to the entries from `at` on."""
+    """Store a vector to the entries from `at` on."""
 
     def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
         builder.store(arguments[2], _place(builder, arguments[0], arguments[1], value.count), align=8)
@@ -89,7 +89,7 @@ def add_to(typing_context, base, at, value):  # type: ignore[no-untyped-def]
 
 @intrinsic
 def gather(typing_context, tile, base, first, step):  # type: ignore[no-untyped-def]
-    """The entries first, first + step, ... of a pointer."""
+    """Gather the entries first, first + step, ..."""
     count = tile.count
 
     def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
@@ -101,7 +101,7 @@ def gather(typing_context, tile, base, first, step):  # type: ignore[no-untyped-
 
 @intrinsic
 def pick(typing_context, tile, base, rows, first, step):  # type: ignore[no-untyped-def]
-    """The entries of a pointer whose numbers stand in rows[first], rows[first + step], ..."""
+    """Gather the entries with the indices rows[first], rows[first + step], ..."""
     count = tile.count
 
     def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
@@ -121,7 +121,7 @@ def _collected(builder: Any, numbers: list[Any], base: Any) -> Any:
 
 @intrinsic
 def spread(typing_context, tile, number):  # type: ignore[no-untyped-def]
-    """One number in all lanes."""
+    """Broadcast a number to all lanes."""
     count = tile.count
 
     def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
@@ -132,7 +132,7 @@ def spread(typing_context, tile, number):  # type: ignore[no-untyped-def]
 
 @intrinsic
 def repeat(typing_context, tile, group, base, at):  # type: ignore[no-untyped-def]
-    """The entries of a pointer from `at` on, as many as the group has members, again and again."""
+    """Load as many entries from `at` on as the group has members, and repeat them over the lanes."""
     count, members = tile.count, group.count
     if count % members:
         raise TypeError(f"repeat: {count} lanes are no multiple of {members}")
@@ -147,7 +147,7 @@ def repeat(typing_context, tile, group, base, at):  # type: ignore[no-untyped-de
 
 @intrinsic
 def root(typing_context, x):  # type: ignore[no-untyped-def]
-    """The square root of a vector."""
+    """Return the square root of a vector."""
 
     def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
         kind = arguments[0].type
@@ -165,7 +165,7 @@ def _knows_digits(context: Any, count: int) -> bool:
 
 
 def _near(builder: Any, name: str, value: Any) -> Any:
-    """The first 14 bits of an inverse, by AVX-512."""
+    """Return an approximate inverse of 14 bits, by AVX-512."""
     kind = value.type
     function = ir.FunctionType(kind, [kind, kind, ir.IntType(8)])
     found = cgutils.get_or_insert_function(builder.module, function, f"llvm.x86.avx512.{name}.pd.512")
@@ -174,10 +174,10 @@ def _near(builder: Any, name: str, value: Any) -> Any:
 
 @intrinsic
 def inverse_root(typing_context, x):  # type: ignore[no-untyped-def]
-    """1/sqrt of a vector of positive numbers, to their last digit or two; zero and infinity may give no number.
+    """Return 1/sqrt of positive numbers, to the last digit or two; NaN is possible for zero and infinity.
 
-    Square root and division are what a processor is slowest at. AVX-512 knows 14 bits of the result at once, from which
-    the first four terms of its series by the relative error of the square make all of them.
+    Square root and division are the slowest instructions. AVX-512 has an approximation of 14 bits; the first four terms
+    of the series in the relative error of its square give the rest.
     """
 
     def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
@@ -202,7 +202,7 @@ def inverse_root(typing_context, x):  # type: ignore[no-untyped-def]
 
 @intrinsic
 def reciprocal(typing_context, x):  # type: ignore[no-untyped-def]
-    """1/x of a vector, to its last digit or two; zero and infinity may give no number. See `inverse_root`."""
+    """Return 1/x to the last digit or two, as `inverse_root`; NaN is possible for zero and infinity."""
 
     def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
         (value,) = arguments
@@ -222,7 +222,7 @@ def reciprocal(typing_context, x):  # type: ignore[no-untyped-def]
 
 @intrinsic
 def heaviside(typing_context, x):  # type: ignore[no-untyped-def]
-    """1 where a vector is not negative, elsewhere 0."""
+    """Return 1 where a vector is not negative, elsewhere 0."""
 
     def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
         zero = ir.Constant(arguments[0].type, [0.0] * x.count)
@@ -233,7 +233,7 @@ def heaviside(typing_context, x):  # type: ignore[no-untyped-def]
 
 @intrinsic
 def inverse_below(typing_context, x, limit):  # type: ignore[no-untyped-def]
-    """1/x where a vector is below a limit, elsewhere 0."""
+    """Return 1/x where a vector is below a limit, elsewhere 0."""
 
     def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
         value, limit = arguments
@@ -246,7 +246,7 @@ def inverse_below(typing_context, x, limit):  # type: ignore[no-untyped-def]
 
 @intrinsic
 def zeros(typing_context, x):  # type: ignore[no-untyped-def]
-    """How many numbers of a vector are 0."""
+    """Count the zeros of a vector."""
 
     def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
         (value,) = arguments
@@ -262,7 +262,7 @@ def zeros(typing_context, x):  # type: ignore[no-untyped-def]
 
 @intrinsic
 def least(typing_context, x):  # type: ignore[no-untyped-def]
-    """The least number of a vector, of those that are numbers."""
+    """Return the minimum of a vector; NaN is ignored."""
 
     def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
         (value,) = arguments
@@ -275,7 +275,7 @@ def least(typing_context, x):  # type: ignore[no-untyped-def]
 
 @intrinsic
 def larger(typing_context, x, y):  # type: ignore[no-untyped-def]
-    """The larger of the sizes |x| and |y|."""
+    """Return max(|x|, |y|)."""
 
     def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
         kind = arguments[0].type
@@ -340,8 +340,8 @@ def _negated(x):  # type: ignore[no-untyped-def]
 
 
 @njit(error_model="numpy", forceinline=True)
-def assign(y: Array, x: Array, count: int) -> None:
-    """y = x, so many numbers that do not overlap. Pointers."""
+def assign(y: Pointer, x: Pointer, count: int) -> None:
+    """Copy x to y, `count` numbers behind pointers; y and x do not overlap."""
     whole = count - count % len(EIGHT)
     for i in range(0, whole, len(EIGHT)):
         store(y, i, load(EIGHT, x, i))
@@ -350,8 +350,8 @@ def assign(y: Array, x: Array, count: int) -> None:
 
 
 @njit(error_model="numpy", forceinline=True)
-def add_scaled(y: Array, factor: float, x: Array, count: int) -> None:
-    """y += factor x, so many numbers that do not overlap. Pointers."""
+def add_scaled(y: Pointer, factor: float, x: Pointer, count: int) -> None:
+    """Add factor x to y, `count` numbers behind pointers; y and x do not overlap."""
     whole = count - count % len(EIGHT)
     for i in range(0, whole, len(EIGHT)):
         add_to(y, i, factor * load(EIGHT, x, i))

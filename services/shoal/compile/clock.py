@@ -1,4 +1,4 @@
-"""A clock that stands still while kernels are compiled: what time limits are about, on any machine; nothing heavy."""
+"""A clock that stands still while kernels are compiled, for time limits; nothing heavy is imported."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 Hearer = Callable[[bool], None]
-"""Told whether the clock stands still."""
+"""Takes whether the clock stands still."""
 
 _changing = threading.Lock()
 _compiling, _since, _lost = 0, 0.0, 0.0
@@ -16,14 +16,14 @@ _hearers: list[Hearer] = []
 
 
 def now() -> float:
-    """Seconds since some instant in which this process compiled nothing, nor waited for another that did."""
+    """Return seconds since some instant, without those in which this process compiled or waited for a compilation."""
     with _changing:
         return (_since if _compiling else time.monotonic()) - _lost
 
 
 @contextmanager
 def stopped() -> Iterator[None]:
-    """Meanwhile it stands still, also where this is asked for again or by another thread."""
+    """Stop the clock meanwhile; calls may be nested or come from several threads."""
     _change(1)
     try:
         yield
@@ -47,7 +47,7 @@ def _change(by: int) -> None:
 
 @contextmanager
 def heard(hear: Hearer) -> Iterator[None]:
-    """Meanwhile let somebody hear of each change."""
+    """Call `hear` at each stop and start meanwhile."""
     _hearers.append(hear)
     try:
         yield

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from llvmlite import binding
 from numba import cfunc, njit, types
-from shoal.mechanics.numerics import simd
+from shoal.compile import simd
+from shoal.compile.pointers import pointer
+from shoal.compile.simd import EIGHT
 from shoal.mechanics.numerics.arc import arctangent, turn
-from shoal.mechanics.numerics.pointers import pointer
-from shoal.mechanics.numerics.simd import EIGHT
 
 LENGTHS = pytest.mark.parametrize("lanes", [(0,) * 2, (0,) * 4, EIGHT, (0,) * 16], ids=len)
 SPECIAL = [0.0, -0.0, 1.0, -1.0, np.inf, -np.inf, np.nan, 5e-324, 2.3e-308, 1.7e308, -1.7e308, 1e-200, 1e200]

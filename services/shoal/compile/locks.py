@@ -1,8 +1,8 @@
-"""Compilation as those who wait for it want it: each kernel once, many at a time, and told about.
+"""Compilation under locks between processes, with progress.
 
-Numba keeps what it compiled in a folder, without a lock: processes that start together compile the same, and two that
-write the same index at once can lose or mix up its entries. Here each compilation has a lock, so that whoever comes
-second waits and then loads.
+Numba keeps what it compiled in a folder, without a lock: processes that start together compile the same kernels, and
+two that write the same index at once can lose or mix up its entries. Here each compilation has a lock: the second
+process waits and then loads.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from numba import types
 from numba.core import caching, config, dispatcher, event
 from numba.core.compiler_lock import global_compiler_lock
 
+from shoal.compile import clock, linking
+from shoal.compile.progress import report
 from shoal.errors import FULL, ComputationError
-from shoal.mechanics import clock, linking
-from shoal.mechanics.notes import tell
 
 if sys.platform != "win32":
     import fcntl
@@ -38,14 +38,14 @@ SECONDS = {
     "_energies": 2.0,
     "_energy": 1.0,
 }
-"""What large kernels take on one core of a server: for the order, and to say how long it will take."""
+"""Seconds that large kernels take to compile on one core of a server: for their order and the estimate shown."""
 _WORTH_A_LINE = 1.0
-"""Seconds."""
+"""Compilations that took at least so long are reported [s]."""
 
 
 def described(name: str, kinds: tuple[Any, ...]) -> str:
-    """What a person may know a kernel by: its name, for how many lanes, and the structure that it is made for."""
-    if len(kinds) == 1 and isinstance(kinds[0], types.CPointer):  # a frame's place
+    """Return a name of a kernel for people: its function, its structure and the number of lanes."""
+    if len(kinds) == 1 and isinstance(kinds[0], types.CPointer):  # the address of a frame
         kinds = tuple(kinds[0].dtype)
     lanes = getattr(kinds[0], "count", 0) if kinds else 0
     width = {0: "", 1: ", single"}.get(lanes, ", lanes")
@@ -54,10 +54,10 @@ def described(name: str, kinds: tuple[Any, ...]) -> str:
 
 
 class _Listener(event.Listener):  # type: ignore[misc]
-    """Tells of the outermost kernels; those that they call are a part of them."""
+    """Reports the outermost kernels; those that they call are a part of them."""
 
     def __init__(self) -> None:
-        self._depth, self._begin, self._told = 0, 0.0, False
+        self._depth, self._begin, self._announced = 0, 0.0, False
 
     def on_start(self, event: Any) -> None:
         """A kernel begins."""
@@ -65,16 +65,16 @@ class _Listener(event.Listener):  # type: ignore[misc]
         if self._depth > 1:
             return
         self._begin = time.perf_counter()
-        if not self._told and event.data["dispatcher"].__name__ in SECONDS:
-            self._told = True
-            tell("compiling what the solver lacks for this machine, once, which time limits do not count")
+        if not self._announced and event.data["dispatcher"].__name__ in SECONDS:
+            self._announced = True
+            report("compiling what the solver lacks for this machine, once, which time limits do not count")
 
     def on_end(self, event: Any) -> None:
         """A kernel is done, or could not be compiled."""
         self._depth -= 1
         took = time.perf_counter() - self._begin
         if self._depth == 0 and took >= _WORTH_A_LINE:
-            tell(f"  {described(event.data['dispatcher'].__name__, event.data['args'])}: {took:.1f} s")
+            report(f"  {described(event.data['dispatcher'].__name__, event.data['args'])}: {took:.1f} s")
 
 
 @cache
@@ -91,10 +91,10 @@ def _lock_file() -> int | None:
 
 
 @contextmanager
-def _alone(what: str) -> Iterator[None]:
-    """No other process is at the same; a lock of one byte, at a place that the name decides.
+def _locked(what: str) -> Iterator[None]:
+    """Hold a lock of this name between processes: of one byte, at an offset that the name decides.
 
-    Numba's own lock comes first, so that one thread of a process at a time waits for others.
+    Numba's own lock comes first, so that one thread of a process at a time waits for other processes.
     """
     file = _lock_file() if config.CACHE_DIR else None
     place = zlib.crc32(what.encode())
@@ -121,7 +121,7 @@ def _compile(self: Any, sig: Any) -> Any:
     """
     whole = isinstance(self._cache, caching.NullCache)
     name = f"{self.py_func.__module__}.{self.py_func.__qualname__} {sig}"
-    with clock.stopped(), global_compiler_lock if whole else _alone(name), linking.level(self, sig):
+    with clock.stopped(), global_compiler_lock if whole else _locked(name), linking.level(self, sig):
         try:
             return _numbas_compile(self, sig)
         except OSError as error:
@@ -133,14 +133,14 @@ def _compile(self: Any, sig: Any) -> Any:
 
 def _save(self: Any, sig: Any, data: Any) -> None:
     """`Cache.save_overload`: reads the index of all types of arguments, adds to it, writes it."""
-    with _alone(f"index of {self.cache_path}/{self._impl.filename_base}"):
+    with _locked(f"index of {self.cache_path}/{self._impl.filename_base}"):
         _numbas_save(self, sig, data)
 
 
 @cache
-def watch() -> None:
-    """From now on compile under locks, and tell of it (`notes`)."""
-    linking.link()
+def install() -> None:
+    """Install: from now on compile under locks, link parts (`linking`) and report (`progress`)."""
+    linking.install()
     dispatcher.Dispatcher.compile = _compile  # type: ignore[method-assign]
     caching.Cache.save_overload = _save
     event.register("numba:compile", _Listener())

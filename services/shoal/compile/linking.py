@@ -1,13 +1,13 @@
-"""What kernels call is compiled to be linked into them, and no further.
+"""Link-time optimisation of kernels: functions that only kernels call are kept as intermediate code.
 
-Numba makes machine code and doors for Python and C of every function, also of those that are only ever parts of others:
-they are optimised and emitted once by themselves and once more within each caller, level by level. Here only what
-Python or a gate asks for is optimised and emitted, with all that it calls; the parts stay intermediate code, in the
-cache as well. A part that is called from Python later is compiled again, with its doors.
+Numba makes machine code, with entry points for Python and C, of every function, also of those that are only parts of
+others: they are optimised and emitted once by themselves and again within each caller, level by level. Here only an
+entry (called from Python or by a function pointer) is optimised and emitted, with all that it calls; its parts stay
+intermediate code, in the cache as well. A part that is called from Python later is compiled again, as an entry.
 
-Parts of several processes meet in one module there, by their names. Numba tells functions of the same name, which
-differ in what they enclose, by a number that every process counts from 1: the sum of two vectors would become the
-product that another process has under this number. Here each process begins at a place of its own.
+Parts that several processes compiled meet in one module, by their names. Numba distinguishes functions of one name that
+enclose different values by a number that every process counts from 1: the sum of two vectors would become the product
+that another process has under this number. Here each process counts from a random number.
 
 Numba offers no setting for this: private names of version 0.68 are replaced.
 """
@@ -28,7 +28,7 @@ from numba.core.environment import lookup_environment
 
 _LINKED = "linked"
 _depth = 0
-"""How many compilations are under way, each asked for by the one before; Numba's lock is held meanwhile."""
+"""Depth of nested compilations, each required by the one before; Numba's lock is held meanwhile."""
 
 
 class Part:
@@ -37,7 +37,7 @@ class Part:
 
 @contextmanager
 def level(function: Any, signature: Any) -> Iterator[None]:
-    """A compilation: the outermost makes an entry, those within make parts. Numba's lock is held."""
+    """Enter a compilation: the outermost makes an entry, those within it make parts. Numba's lock is held."""
     global _depth
     if _depth == 0:
         kinds = tuple(sigutils.normalize_signature(signature)[0])
@@ -52,8 +52,8 @@ def level(function: Any, signature: Any) -> Iterator[None]:
 
 
 @cache
-def link() -> None:
-    """From now on functions within functions are linked only, and numbered as in no other process."""
+def install() -> None:
+    """Install: from now on functions that kernels call are linked only, and numbered as in no other process."""
     numbas_flags = dispatcher._FunctionCompiler._customize_flags  # type: ignore[attr-defined]
     numbas_executable = cpu.CPUContext.get_executable
     numbas_set_env = codegen.JITCPUCodegen.set_env
@@ -124,12 +124,12 @@ def link() -> None:
 
 
 def _number() -> None:
-    """Numba's numbers of functions begin where no other process begins."""
+    """Let Numba number functions from a random number, as no other process does."""
     bytecode.FunctionIdentity._unique_ids = itertools.count(secrets.randbits(62))
 
 
 def _gather(library: Any) -> None:
-    """Put a function and what it calls into one module, as it is: whoever takes it in optimises the whole."""
+    """Put a function and what it calls into one module, not optimised: the entry that takes it in is."""
     if library._finalized:
         return
     for part in dict.fromkeys(library._linking_libraries):

@@ -1,7 +1,6 @@
-"""What Numba need not do before it is asked to.
+"""Deferred initialisation of Numba, for processes that only load kernels that were compiled earlier.
 
-Who only loads kernels that were compiled earlier does not compile: half a second that a command need not wait for. All
-of it is Numba's private interface, of the one version that the package depends on.
+It saves a command half a second. Private names of the one version of Numba that the package depends on are replaced.
 """
 
 from __future__ import annotations
@@ -19,21 +18,20 @@ _OWN = "shoal."
 
 
 @cache
-def put_off() -> None:
-    """Let Numba do later what compiling needs, and most runs do not."""
-    _put_off_blas()
+def install() -> None:
+    """Install: from now on Numba prepares for compilation when it first compiles."""
+    _defer_blas()
     caching.Cache.load_overload = _load
     JITCodeLibrary._unserialize = classmethod(_unserialize)
     JITCodeLibrary._get_module_for_linking = _module_for_linking
     JITCodeLibrary.get_pointer_to_function = _pointer_to_function
 
 
-def _put_off_blas() -> None:
-    """Let Numba believe, until a kernel wants linear algebra, that scipy has it.
+def _defer_blas() -> None:
+    """Let Numba import `scipy.linalg` when a kernel first uses linear algebra.
 
-    When its `arraymath` is imported, as many a kernel wants it, Numba looks whether `scipy.linalg` is there, by
-    importing it: a sixth of a second, for kernels that multiply no matrices. It is there, as Shoal depends on scipy;
-    whoever compiles `a @ b` or `np.linalg` makes Numba look then.
+    Numba imports it together with its `arraymath`, to find out whether it exists: a sixth of a second, for kernels that
+    multiply no matrices. It exists, as Shoal depends on scipy; compiling `a @ b` or `np.linalg` imports it then.
     """
     from numba.np import linalg
 
@@ -53,9 +51,9 @@ _numbas_load = caching.Cache.load_overload
 
 
 def _load(self: Any, sig: Any, context: Any) -> Any:
-    """`Cache.load_overload`, which first has all of Numba's own functions registered.
+    """Replace `Cache.load_overload`, which first registers all of Numba's own functions.
 
-    Who compiles needs them, and has it done then. Machine code needs the runtime only.
+    Compilation registers them when it needs them; machine code needs the runtime only.
     """
     if not self._py_func.__module__.startswith(_OWN):
         return _numbas_load(self, sig, context)
@@ -69,7 +67,7 @@ _numbas_pointer_to_function = JITCodeLibrary.get_pointer_to_function
 
 
 def _unserialize(cls: Any, codegen: Any, state: Any) -> Any:
-    """`JITCodeLibrary._unserialize`, which also parses the code that others are compiled with, beside machine code."""
+    """Replace `JITCodeLibrary._unserialize`, which parses the intermediate code along with the machine code."""
     name, kind, data = state
     if kind != "object":
         return CPUCodeLibrary._unserialize.__func__(cls, codegen, state)
@@ -82,7 +80,7 @@ def _unserialize(cls: Any, codegen: Any, state: Any) -> Any:
 
 
 def _module_for_linking(self: Any) -> Any:
-    """`JITCodeLibrary._get_module_for_linking`: somebody is compiled with it."""
+    """Replace `JITCodeLibrary._get_module_for_linking`: parse the intermediate code when a caller needs it."""
     if (data := self.__dict__.pop("unparsed", None)) is not None:
         self._shared_module = llvm.parse_bitcode(data[1])
         self._codegen._engine._load_defined_symbols(self._shared_module)
@@ -90,7 +88,7 @@ def _module_for_linking(self: Any) -> Any:
 
 
 def _pointer_to_function(self: Any, name: str) -> Any:
-    """`JITCodeLibrary.get_pointer_to_function`, which knows the names of what was parsed only."""
+    """Replace `JITCodeLibrary.get_pointer_to_function`, which knows the names of parsed code only."""
     if "unparsed" in self.__dict__ and name.encode() + b"\0" in self.unparsed[0]:
         self._codegen._engine._defined_symbols.add(name)
     return _numbas_pointer_to_function(self, name)

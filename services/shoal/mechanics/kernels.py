@@ -1,9 +1,10 @@
-"""The gates between the integrators and the mechanics: kernels that are compiled once and called by their addresses.
+"""Compiled kernels of the mechanics, which the integrators call through a table of function pointers.
 
-Each function here does what the one of the same name does that its gate calls, a few lines below; `numerics.gate` says
-why. `ready` compiles what a model calls, or takes it from the cache: constraints where there are some, and the families
-of elements that it has. What merely leads from a gate to its work is put into it by Numba (`inline="always"`): LLVM
-optimises all that a function calls once more for every function above it.
+Forces, constraints and each family of elements are compiled once, and not into every integrator. Each public function
+calls the kernel of the same name by its address; the kernel follows it, with an underscore. `ready` compiles the
+kernels that a model calls, or takes them from the cache: constraints where there are some, and the families of elements
+that it has. What only leads to the work is put into its caller by Numba (`inline="always"`), as LLVM optimises all that
+a function calls once more for every function above it.
 """
 
 from __future__ import annotations
@@ -15,20 +16,22 @@ from typing import Any
 import numpy as np
 from numba import njit, typeof, types
 
-from shoal.mechanics import compilation, dynamics
+from shoal.compile import locks
+from shoal.compile.function_pointers import address, call
+from shoal.compile.pointers import raw_type
+from shoal.compile.structures import load, pointer_to, storage, store
+from shoal.mechanics import dynamics
 from shoal.mechanics.dynamics import ACCELERATION, ALL, ELASTIC, SIMPLE, Work, instant
 from shoal.mechanics.elements import families
 from shoal.mechanics.least import drift
 from shoal.mechanics.least.principle import PROJECTION
-from shoal.mechanics.model import Arrays, Gates
-from shoal.mechanics.numerics import gate
-from shoal.mechanics.numerics.pointers import raw_type
+from shoal.mechanics.model import Arrays, FunctionTable
 from shoal.mechanics.numerics.tile import SINGLE, Array, Index, Tile, index
 
 Kernel = tuple[Any, tuple[Any, ...]]
 """A function that is compiled, and the types of its arguments."""
 Seek = Callable[[float, Array], None]
-"""Seeks the acceleration of a single lane in place of the kernels: (time [s], the forces Q (unknowns,), which it
+"""Finds the acceleration of a single lane in place of the kernels: (time [s], the forces Q (unknowns,), which it
 replaces by the acceleration). The state, C_q and eta are in the work space, where it leaves the multipliers."""
 
 _CALLED = ctypes.CFUNCTYPE(None, ctypes.c_double, ctypes.POINTER(ctypes.c_double))
@@ -36,40 +39,55 @@ _CALLED = ctypes.CFUNCTYPE(None, ctypes.c_double, ctypes.POINTER(ctypes.c_double
 
 @njit(cache=True, error_model="numpy")
 def enter(m: Arrays, w: Work) -> None:
-    """Store both structures where the gates find them; at the beginning of a compiled loop."""
-    gate.store(m.home, m)
-    gate.store(w.home, w)
+    """Write both structures into their storage, where kernels read them; at the beginning of a compiled loop."""
+    store(m.storage, m)
+    store(w.storage, w)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def force(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, f: Array) -> None:
     """All of `dynamics.force`."""
     t = instant(w, t)
-    gate.call(m.gates.motion, (tile, gate.typed(m.home, m), gate.typed(w.home, w), t, z, zdot, 0.0, f, ALL))
+    call(
+        m.table.motion,
+        (tile, pointer_to(m.storage, m), pointer_to(w.storage, w), t, z, zdot, 0.0, f, ALL),
+    )
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def elastic_force(tile: Tile, m: Arrays, w: Work, z: Array, f: Array, exact: bool) -> None:
     """The elastic part of `dynamics.force`; exact: without the elements of `dynamics.add_mean_force`."""
     part = SIMPLE if exact else ELASTIC
-    gate.call(m.gates.motion, (tile, gate.typed(m.home, m), gate.typed(w.home, w), 0.0, z, z, 0.0, f, part))
+    call(
+        m.table.motion,
+        (tile, pointer_to(m.storage, m), pointer_to(w.storage, w), 0.0, z, z, 0.0, f, part),
+    )
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def acceleration(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, tolerance: float, a: Array) -> None:
     """All of `dynamics.force`, then `dynamics.accelerate`; z, zdot, a: (rows, lanes)."""
     t = instant(w, t)
-    arguments = (gate.typed(m.home, m), gate.typed(w.home, w), t, z, zdot, tolerance, a, ACCELERATION)
-    gate.call(m.gates.motion, (tile, *arguments))
+    arguments = (
+        pointer_to(m.storage, m),
+        pointer_to(w.storage, w),
+        t,
+        z,
+        zdot,
+        tolerance,
+        a,
+        ACCELERATION,
+    )
+    call(m.table.motion, (tile, *arguments))
 
 
 @njit(cache=True, error_model="numpy")
 def _motion(tile, pm, pw, t, z, zdot, tolerance, a, part):  # type: ignore[no-untyped-def]
     # Each way loads what it looks at itself; all of both structures at every step would cost as much as two elements.
-    if part == ACCELERATION and dynamics.free(gate.load(pm)):
-        dynamics.free_acceleration(tile, gate.load(pm), gate.load(pw), z, zdot, a)
+    if part == ACCELERATION and dynamics.free(load(pm)):
+        dynamics.free_acceleration(tile, load(pm), load(pw), z, zdot, a)
         return
-    m, w = gate.load(pm), gate.load(pw)
+    m, w = load(pm), load(pw)
     dynamics.force(tile, m, w, t, z, zdot, a, part)
     if part == ACCELERATION:
         dynamics.accelerate(tile, m, w, t, z, zdot, tolerance, a)
@@ -85,37 +103,47 @@ def settle(
     """
     if m.constraints.size > 0 and m.projects:
         t = instant(w, t)
-        ready = found and m.gates.sought == 0 and m.method == PROJECTION
-        arguments = (gate.typed(m.home, m), gate.typed(w.home, w), t, tolerance, iterations, ready)
-        gate.call(m.gates.settle, (tile, *arguments))
+        ready = found and m.table.sought == 0 and m.method == PROJECTION
+        arguments = (
+            pointer_to(m.storage, m),
+            pointer_to(w.storage, w),
+            t,
+            tolerance,
+            iterations,
+            ready,
+        )
+        call(m.table.settle, (tile, *arguments))
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def meet(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float) -> None:
     """Let driven constraints take up their new rates at once: a plastic impact, the least change in the mass metric."""
-    gate.call(m.gates.settle, (tile, gate.typed(m.home, m), gate.typed(w.home, w), t, tolerance, 3, False))
+    call(
+        m.table.settle,
+        (tile, pointer_to(m.storage, m), pointer_to(w.storage, w), t, tolerance, 3, False),
+    )
 
 
 @njit(cache=True, error_model="numpy")
 def _settle(tile, pm, pw, t, tolerance, iterations, ready):  # type: ignore[no-untyped-def]
-    m, w = gate.load(pm), gate.load(pw)
+    m, w = load(pm), load(pw)
     drift.project(tile, m, w.gauss, t, w.z, w.zdot, tolerance, iterations, ready)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def energies(tile: Tile, m: Arrays, w: Work) -> None:
     """`dynamics.energies`."""
-    gate.call(m.gates.energies, (tile, gate.typed(m.home, m), gate.typed(w.home, w)))
+    call(m.table.energies, (tile, pointer_to(m.storage, m), pointer_to(w.storage, w)))
 
 
 @njit(cache=True, error_model="numpy")
 def _energies(tile, pm, pw):  # type: ignore[no-untyped-def]
-    dynamics.energies(tile, gate.load(pm), gate.load(pw))
+    dynamics.energies(tile, load(pm), load(pw))
 
 
 @njit(cache=True, error_model="numpy")
 def _constrain(tile, pm, pw, t, z, zdot, tolerance, a):  # type: ignore[no-untyped-def]
-    dynamics.constrain(tile, gate.load(pm), gate.load(pw), t, z, zdot, tolerance, a)
+    dynamics.constrain(tile, load(pm), load(pw), t, z, zdot, tolerance, a)
 
 
 @njit(cache=True, error_model="numpy")
@@ -139,71 +167,74 @@ def _damping(tile, family, z, w, out, first):  # type: ignore[no-untyped-def]
 
 
 _NUMBER, _COUNT, _FLAG, _ROWS = types.float64, types.int64, types.boolean, types.CPointer(types.float64)
-_STATE_GATES: dict[str, Kernel] = {
+_STATE_KERNELS: dict[str, Kernel] = {
     "motion": (_motion, (_NUMBER, _ROWS, _ROWS, _NUMBER, _ROWS, _COUNT)),
     "energies": (_energies, ()),
     "constrain": (_constrain, (_NUMBER, _ROWS, _ROWS, _NUMBER, _ROWS)),
     "settle": (_settle, (_NUMBER, _NUMBER, _COUNT, _FLAG)),
 }
-"""Gates of a whole state, and the types of their arguments after the tile and the two structures."""
-_FAMILY_GATES: dict[str, Kernel] = {
+"""Kernels of a whole state, and the types of their arguments after the tile and the two structures."""
+_FAMILY_KERNELS: dict[str, Kernel] = {
     "force": (_force, (_ROWS, _ROWS, _ROWS, _ROWS, _ROWS, _FLAG)),
     "energy": (_energy, (_ROWS, _ROWS, _ROWS, _COUNT)),
     "stiffness": (_stiffness, (_ROWS, _ROWS, _ROWS, _COUNT)),
     "damping": (_damping, (_ROWS, _ROWS, _ROWS, _COUNT)),
 }
-"""Gates of one family of elements, and the types of their arguments after the tile and the family."""
+"""Kernels of one family of elements, and the types of their arguments after the tile and the family."""
 
-compilation.watch()
+locks.install()
 _FOUND: dict[tuple[str, int, type, int], int] = {}
-_READY: dict[tuple[int, int, bool, tuple[bool, ...]], Gates] = {}
+_READY: dict[tuple[int, int, bool, tuple[bool, ...]], FunctionTable] = {}
 
 
 def ready(tile: Tile, arrays: Arrays, room: Work) -> Arrays:
-    """The same arrays with a home of their own and the gates that they have a use for."""
+    """Return the same arrays with storage of their own and pointers to the kernels that they call."""
     acting = tuple(family.size > 0 for family in arrays.elements)
     key = len(tile), len(arrays.space), arrays.constraints.size > 0, acting
     if key not in _READY:
         wanted = _wanted(arrays)
         motion, energies, constrain, settle = (
-            _address(name, tile, arrays, room) if name in wanted else 0 for name in _STATE_GATES
+            _address(name, tile, arrays, room) if name in wanted else 0 for name in _STATE_KERNELS
         )
-        force, energy = (family_gates(name, tile, arrays.elements) for name in ("force", "energy"))
-        _READY[key] = Gates(motion, energies, constrain, settle, force, energy)
-    return arrays._replace(home=gate.home(), gates=_READY[key])
+        force, energy = (family_pointers(name, tile, arrays.elements) for name in ("force", "energy"))
+        _READY[key] = FunctionTable(motion, energies, constrain, settle, force, energy)
+    return arrays._replace(storage=storage(), table=_READY[key])
 
 
-def family_gates(name: str, tile: Tile, elements: tuple[Any, ...]) -> Index:
+def family_pointers(name: str, tile: Tile, elements: tuple[Any, ...]) -> Index:
     """Addresses of "force", "energy", "stiffness" or "damping" by family; 0 for a family that has none of it."""
     wanted = [family.size > 0 and (family.damped or name != "damping") for family in elements]
     return index([_address(name, tile, one) if want else 0 for one, want in zip(elements, wanted, strict=True)])
 
 
-def kernels(tile: Tile, arrays: Arrays, room: Work, *, every: bool = False) -> list[Kernel]:
-    """What `ready` compiles, and the stiffness, for stability limits and implicit steps; every: for any model."""
-    found = [_kernel(name, tile, arrays, room) for name in (_STATE_GATES if every else _wanted(arrays))]
+def signatures(tile: Tile, arrays: Arrays, room: Work, *, every: bool = False) -> list[Kernel]:
+    """Return the kernels that `ready` compiles, and the stiffness, for limits of stability and implicit steps.
+
+    every: the kernels of any model
+    """
+    found = [_kernel(name, tile, arrays, room) for name in (_STATE_KERNELS if every else _wanted(arrays))]
     elements = [family for family in arrays.elements if every or family.size > 0]
     return found + [_kernel(name, tile, one) for name in ("force", "energy", "stiffness") for one in elements]
 
 
 def _wanted(arrays: Arrays) -> tuple[str, ...]:
-    return tuple(_STATE_GATES) if arrays.constraints.size > 0 else ("motion", "energies")
+    return tuple(_STATE_KERNELS) if arrays.constraints.size > 0 else ("motion", "energies")
 
 
 def _kernel(name: str, tile: Tile, *parts: Any) -> Kernel:
-    """A gate for these structures: those of a state, or a family."""
+    """Return the kernel for these structures, those of a state or a family, with its argument types."""
     raws = [raw_type(typeof(part)) for part in parts]
-    if name in _FAMILY_GATES:
-        kernel, own = _FAMILY_GATES[name]
+    if name in _FAMILY_KERNELS:
+        kernel, own = _FAMILY_KERNELS[name]
         return kernel, (typeof(tile), *raws, *own)
-    kernel, own = _STATE_GATES[name]
+    kernel, own = _STATE_KERNELS[name]
     return kernel, (typeof(tile), *(types.CPointer(kind) for kind in raws), *own)
 
 
 def _address(name: str, tile: Tile, *parts: Any) -> int:
     key = name, len(tile), type(parts[0]), len(getattr(parts[0], "space", ()))
     if key not in _FOUND:
-        _FOUND[key] = gate.address(*_kernel(name, tile, *parts))
+        _FOUND[key] = address(*_kernel(name, tile, *parts))
     return _FOUND[key]
 
 
@@ -218,8 +249,8 @@ class Sought:
     def joined(self, arrays: Arrays, room: Work) -> Arrays:
         """The arrays of a single lane with accelerations that are sought."""
         where = ctypes.cast(self._called, ctypes.c_void_p).value or 0
-        gates = arrays.gates._replace(constrain=_address("constrain", SINGLE, arrays, room), sought=where)
-        return arrays._replace(gates=gates)
+        table = arrays.table._replace(constrain=_address("constrain", SINGLE, arrays, room), sought=where)
+        return arrays._replace(table=table)
 
     def _call(self, t: float, place: Any) -> None:
         a = np.ctypeslib.as_array(place, (self._unknowns,))
