@@ -49,7 +49,7 @@ def test_the_rule_is_that_of_numpy() -> None:
     assert weights == pytest.approx(others / others.sum(), abs=1e-14)
 
 
-@pytest.mark.parametrize("phase", [0.3, 1.0, 3.0, 6.0])
+@pytest.mark.parametrize("phase", [0.3, 1.0, 6.0, 6.26, 15.0])
 def test_a_turning_rod_takes_few_runs(phase: float) -> None:
     """E cos(a + s z) = cos a exp(-s^2 / 2) for a rate that is normal."""
     answer = asked(lambda x: np.cos(0.7 + phase * x), Normal(0.0, 1.0))
@@ -60,7 +60,7 @@ def test_a_turning_rod_takes_few_runs(phase: float) -> None:
     assert told.mean[0] == pytest.approx(mean, abs=1e-6)
     assert told.std[0] == pytest.approx(np.sqrt(square - mean**2), rel=1e-5)
     assert "Gauss quadrature" in answer.found.why
-    assert answer.runs.evaluations <= 320
+    assert answer.runs.evaluations <= 520
 
 
 @pytest.mark.parametrize("seed", range(6))

@@ -214,3 +214,6 @@ def _save_worst(response: Response, file: Path, of: str) -> None:
         path = file if len(cases) == 1 else file.with_stem(f"{file.stem}-{k + 1}")
         case.save(path)
         click.echo(f"{path}: {case.scene.description}", err=True)
+    if not of and len(cases) < len(response.limits):
+        missing = [one.limit.text for one in response.limits if one.shown is None]
+        click.echo(f"no run comes near {' or '.join(missing)}: no worst case is written", err=True)

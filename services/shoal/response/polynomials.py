@@ -42,7 +42,7 @@ class Recurrence:
 
 HIGHEST = 40
 """Degree to which recurrences of measures are computed, and of polynomials that are fitted."""
-CLASSICAL = 128
+CLASSICAL = 1024
 """Degree to which those in closed form are known."""
 _k = np.arange(CLASSICAL + 1, dtype=float)
 LEGENDRE = Recurrence(np.zeros(CLASSICAL + 1), np.divide(_k**2, 4 * _k**2 - 1))

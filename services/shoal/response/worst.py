@@ -42,14 +42,14 @@ def worst(found: Response, of: str = "") -> list[Worst]:
 
     The runs of limits have been verified as the study was asked to; that of a bound is verified here.
     """
-    cases = {one.limit.text: one.shown for one in found.limits if one.shown is not None}
-    if of in cases:
-        return [_case(found, of, cases[of])]
-    if of or not found.limits:
+    limits = [one.limit.text for one in found.limits]
+    if of not in limits and (of or not limits):
         of, shown = _bound(found, of or _widest(found))
         return [_case(found, of, shown)]
+    wanted = [of] if of else limits
+    cases = {one.limit.text: one.shown for one in found.limits if one.shown is not None and one.limit.text in wanted}
     if not cases:
-        raise InputError("worst: no run comes near a limit, so that there is no worst case of one")
+        raise InputError(f"worst: no run comes near {' or '.join(wanted)}, so that there is no worst case")
     return [_case(found, text, shown) for text, shown in cases.items()]
 
 

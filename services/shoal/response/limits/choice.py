@@ -122,7 +122,11 @@ def auto(margins: Margins, seed: int) -> Passing:
 
     Where the limit is passed often, plain sampling is as good.
     """
+    whole = margins.most
+    # Subset simulation far from a limit takes all runs that it is given.
+    margins.most -= math.ceil(PLAIN * margins.left)
     pilot = subset(margins, min(PILOT, max(margins.left // 16, 20)), seed)
+    margins.most = whole
     rough = pilot.estimate
     if rough.probability >= OFTEN:
         found = monte_carlo(margins, seed + 1)
