@@ -22,7 +22,7 @@ from shoal.trajectory import Array
 FIRST = {1: 8, 2: 6}
 """Points in each parameter of the first rule, by the number of parameters."""
 MOST = {1: 256, 2: 576}
-"""Runs of one rule. A uniform parameter has as many points; of 1024 points of a normal one 143 are not negligible, which
+"""Runs of one rule. A uniform parameter has as many points. Of 1024 points of a normal one 143 are not negligible; they
 resolve a phase that spreads by 20 rad."""
 NEGLIGIBLE = 1e-12
 """Weight below which a point needs no run: about seven standard deviations out, where values may be impossible."""
