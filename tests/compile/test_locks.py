@@ -97,27 +97,27 @@ def test_what_is_compiled_ahead_is_what_a_run_calls(scene: Scene, lanes: int) ->
     body = next(iter(scene.bodies))
     values = {f"initial.{body}.angle": np.linspace(0.1, 0.2, lanes)} if lanes > 1 else None
     simulate(scene, np.array([1e-3]), values)
-    for kernel in warm.kernels(scene, lanes):
+    for kernel in warm.required(scene, lanes):
         if kernel.name != "_stiffness":
             function = loop if kernel.name == "loop" else getattr(kernels, kernel.name)
             assert kernel.kinds in function.overloads, kernel.name
             assert kernel.cached
 
 
-def _gates(scene: Scene) -> FunctionTable:
+def _table(scene: Scene) -> FunctionTable:
     return at_start(build(scene), SINGLE, ONE)[0].table
 
 
 def test_a_model_has_the_gates_that_it_calls() -> None:
-    assert not _gates(RIGID).force.any()
-    assert np.count_nonzero(_gates(FLEXIBLE).force) == np.count_nonzero(_gates(FLEXIBLE).energy) == 1
-    assert _gates(FLEXIBLE).constrain == _gates(FLEXIBLE).settle == 0
-    assert _gates(CONSTRAINED).constrain != 0
-    assert _gates(CONSTRAINED).settle != 0
+    assert not _table(RIGID).force.any()
+    assert np.count_nonzero(_table(FLEXIBLE).force) == np.count_nonzero(_table(FLEXIBLE).energy) == 1
+    assert _table(FLEXIBLE).constrain == _table(FLEXIBLE).settle == 0
+    assert _table(CONSTRAINED).constrain != 0
+    assert _table(CONSTRAINED).settle != 0
 
 
 def test_ahead_does_nothing_for_what_is_there() -> None:
     simulate(RIGID, np.array([1e-3]))
     lines: list[str] = []
-    warm.ahead(warm.kernels(RIGID, 1), lines.append)
+    warm.ahead(warm.required(RIGID, 1), lines.append)
     assert lines == []
