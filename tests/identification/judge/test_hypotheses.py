@@ -257,7 +257,7 @@ def test_a_right_model_fails_as_often_as_stated() -> None:
         blocks = [Block(np.arange(k, k + 100), np.ones(99)) for k in (0, 100)]
         seen = estimate_noise(residual, basis, blocks)
         test = ScoreTest(residual, basis, blocks, seen, [], False, np.ones(200, bool))
-        rows = table(test, {(f"h{k}", "machine", 1): [wave[None]] for k, wave in enumerate(waves[4:])})
+        rows, _ = table(test, {(f"h{k}", "machine", 1): [wave[None]] for k, wave in enumerate(waves[4:])})
         chances.append(min(row.corrected for row in rows))
         assert rows[0].chance == min(row.chance for row in rows), draw
     # Of 300, 5 % are 15; 27 or more happen once in 500 times by chance.

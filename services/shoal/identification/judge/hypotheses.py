@@ -1,10 +1,12 @@
-"""Score tests of nested models (Rao 1948): whether the data contradict something that was taken as known.
+"""F-tests of nested models: whether the data contradict something that was taken as known.
 
 Each hypothesis frees something stated: a mass, a clock, the place of a pivot. Its effect on the residual, made
-orthogonal to what the sought parameters follow, gives to first order the drop of chi-square if it is freed. Without a
-fault the drop over its freedom is F-distributed. One Jacobian serves all hypotheses, and they are tested together: many
-of them act alike, so that the number of independent tests is the one that the correlations of their effects leave
-(Li and Ji, Heredity 95, 2005).
+orthogonal to what the sought parameters follow, gives to first order the drop of chi-square if it is freed (score test:
+Rao 1948); a fit with it freed gives the drop itself. Without a fault the drop over its freedom is F-distributed. The
+noise is the one that the freed model leaves: what explains a misfit only in part leaves a slow residual of few
+independent samples, so that no drop of it is significant. One Jacobian serves all score tests, and all are tested
+together: many effects are alike, so that the number of independent tests is the one that their correlations leave (Li
+and Ji, Heredity 95, 2005).
 """
 
 from __future__ import annotations
@@ -14,13 +16,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from shoal.identification.forward import ForwardModel
 from shoal.identification.spread.chances import above_f
-from shoal.identification.spread.covariance import Block, Noise, correlate, estimate_noise
+from shoal.identification.spread.covariance import Block, Noise, blocks_of, correlate, estimate_noise
 from shoal.identification.spread.given import Given
+from shoal.identification.spread.uncertainty import followed
 from shoal.trajectory import Array
 
 SIGNIFICANT = 5e-4
 """P-value over all hypotheses below which the data contradict one: of 2000 right models one is rejected."""
+
+_MOST = 0.75
+"""Of the mean square of a residual: a fit that lowers it by so much names what a misfit is mainly due to, although what
+remains is not noise."""
 
 _ROUND_OFF = 1e-9
 """Of the largest eigenvalue of correlations: a smaller one counts as none."""
@@ -31,9 +39,10 @@ class Hypothesis:
     """A row of the table: something taken as known that may be wrong.
 
     name, kind: those of the suspect it may become; numbers: how many are freed with it
-    drop: of chi-square to first order, in units of the variance of the noise, correlated as it is
+    drop: of chi-square, in units of the variance of the noise, correlated as it is
     chance: p-value of the drop, by F; corrected: for all rows of the table
-    explained: share of the mean square of the residual that goes with it, to first order
+    explained: share of the mean square of the residual that goes with it
+    fitted: whether by a fit, else to first order
     """
 
     name: str
@@ -43,11 +52,17 @@ class Hypothesis:
     chance: float
     corrected: float
     explained: float
+    fitted: bool = False
 
     @property
     def significant(self) -> bool:
         """Return whether the data contradict what was taken as known."""
         return self.corrected < SIGNIFICANT
+
+    @property
+    def explains(self) -> bool:
+        """Return whether a fit shows that this is what the residual is due to."""
+        return self.fitted and (self.significant or self.explained >= _MOST)
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +82,32 @@ class ScoreTest:
     given: Sequence[Given]
     stated: bool
     rows: Array
+
+    @classmethod
+    def of(cls, model: ForwardModel, residual: Array, jacobian: Array) -> ScoreTest:
+        """Return that at an answer whose model is without error, by its residual and Jacobian (rows, parameters)."""
+        basis, blocks = followed(jacobian)[0], blocks_of(model, len(residual))
+        noise, stated = estimate_noise(residual, basis, blocks), model.rows.noise is not None
+        return cls(residual, basis, blocks, noise, [], stated, np.ones(len(residual), dtype=bool))
+
+    def fit(
+        self, after: Array, jacobian: Array, numbers: int, others: list[Block] | None = None
+    ) -> tuple[float, float, float]:
+        """Return the drop of chi-square by a fit, its p-value, and the share of the mean square.
+
+        after: its residual (rows,), less what was taken out of `residual`; jacobian: (rows, parameters) there
+        numbers: how many it frees; others: its blocks where it reads the data otherwise
+        The memory of the noise counts along the difference of the residuals, or, of other data, along the residual.
+        """
+        noise = estimate_noise(after, followed(jacobian)[0], others or self.blocks)
+        before = self.residual * self.rows
+        after = after * (self.rows if others is None else np.sqrt(len(before) / len(after)))
+        power, gain = float(before @ before), float(before @ before - after @ after)
+        along = before - after if others is None else before
+        if not gain > 0.0:
+            return 0.0, 1.0, 0.0
+        drop, chance = self._f_test(np.array([np.sqrt(gain)]), (along / np.linalg.norm(along))[None], noise, numbers)
+        return drop, chance, gain / power
 
     def score(self, effects: Array) -> tuple[float, float, float, Array]:
         """Return the drop of chi-square, its p-value, the share of the mean square, and the unit effect (rows,).
@@ -90,18 +131,25 @@ class ScoreTest:
     def _test(self, own: Array, noise: Sequence[Noise]) -> tuple[float, float, float, Array]:
         """The same of orthonormal effects beyond what the parameters follow, (numbers, rows), and a noise."""
         slope = own @ self._own(self.residual)
-        shares = self._shares(own, noise)
-        weights = np.linalg.lstsq(np.sum(shares, axis=0), slope)[0]
-        drop, count = float(slope @ weights), len(own)
+        drop, chance = self._f_test(slope, own, noise, len(own))
         power = float(np.sum(self._own(self.residual) ** 2))
         explained = min(1.0, float(slope @ slope) / max(power, 1e-300))
+        along = slope @ own
+        return drop, chance, explained, along / max(float(np.linalg.norm(along)), 1e-300)
+
+    def _f_test(self, slope: Array, own: Array, noise: Sequence[Noise], numbers: int) -> tuple[float, float]:
+        """Return the drop by slopes (n,) along orthonormal rows (n, rows) in a noise, and its p-value.
+
+        The freedom of a sum of variances is that of Satterthwaite (1946).
+        """
+        shares = self._shares(own, noise)
+        weights = np.linalg.lstsq(np.sum(shares, axis=0), slope)[0]
+        drop = float(slope @ weights)
         parts = np.einsum("i,bij,j->b", weights, shares, weights)
         freedom = [*(seen.freedom for seen in noise), *(one.freedom for one in self.given)]
         total = max(float(np.sum(parts)), 1e-300)
         doubt = sum((part / total) ** 2 / free for part, free in zip(parts, freedom, strict=True))
-        along = slope @ own
-        chance = above_f(count, 1.0 / max(doubt, 1e-9), drop / count)
-        return drop, chance, explained, along / max(float(np.linalg.norm(along)), 1e-300)
+        return drop, above_f(numbers, 1.0 / max(doubt, 1e-9), drop / numbers)
 
     def _own(self, effects: Array) -> Array:
         """Effects (..., rows) beyond what the sought parameters follow, zero where no derivative is believed."""
@@ -129,8 +177,11 @@ Effects = Mapping[tuple[str, str, int], Sequence[Array]]
 """By name, kind and how many numbers are freed: the effects (effects, rows) by each way to measure them."""
 
 
-def table(test: ScoreTest, effects: Effects) -> list[Hypothesis]:
-    """The hypotheses by their effects, the most significant first. Of several ways to measure one the best counts."""
+def table(test: ScoreTest, effects: Effects) -> tuple[list[Hypothesis], float]:
+    """Return the hypotheses by their effects, the most significant first, and how many independent tests they are.
+
+    Of several ways to measure an effect the best counts.
+    """
     scored, units = list[tuple[tuple[str, str, int], tuple[float, float, float]]](), list[Array]()
     for key, ways in effects.items():
         found = [test.score(way) for way in ways if np.all(np.isfinite(way))]
@@ -138,9 +189,9 @@ def table(test: ScoreTest, effects: Effects) -> list[Hypothesis]:
         if found:
             units += [unit for *_, unit in found]
             scored.append((key, min(found, key=lambda one: one[1])[:3]))
-    tests = independent(np.array(units)) if units else 0.0
+    tests = independent(np.array(units)) if units else 1.0
     rows = [Hypothesis(*key, drop, p, min(1.0, tests * p), share) for key, (drop, p, share) in scored]
-    return sorted(rows, key=lambda row: (row.chance, row.name))
+    return sorted(rows, key=lambda row: (row.chance, row.name)), tests
 
 
 def independent(units: Array) -> float:

@@ -29,7 +29,7 @@ from shoal.identification.spread.value import Value
 from shoal.trajectory import Array
 
 _DECISIVE = 5.0
-"""A property of the measurement that lowers even a small misfit by this factor refutes what was stated of it."""
+"""What lowers even a small misfit by this factor refutes what was stated, though intervals that hold it were wide."""
 _NEGLIGIBLE = 1e-4
 """Of the signal: a misfit below it is not looked into."""
 _LOUD = 1.5
@@ -132,9 +132,11 @@ def _by_findings(
     odd = ("", "")
     if misfitting and not looked.cut and (not found or found[0].after > _LOUD * tests.explained):
         odd = unless_late(lambda: odd_stretch(model, outcome.point), odd)
-    if tests.wrong_model or (found and found[0].before >= _DECISIVE * found[0].after):
+    moved = _moved(parameters, looked, tests.rows)
+    decisive = bool(found) and found[0].before >= _DECISIVE * found[0].after
+    if tests.wrong_model or decisive or (misfitting and moved):
         return _rejected(model, outcome, seen, tests, found, odd)
-    if found and not misfitting and (moved := _moved(parameters, looked.refits)):
+    if moved:
         return _refuted(tests, looked, moved)
     if looked.cut and misfitting:
         reason = f"no time was left to see what a misfit of {tests.sized(tests.size)} is due to"
@@ -151,14 +153,23 @@ def _by_findings(
         )
         advice = [f"{', or '.join(more)}, or narrow the bounds to the set that is meant"]
         return Judgement(Verdict.AMBIGUOUS, message, advice, found)
-    judged = _identifiable(model, seen, tests, with_refits(model, parameters, looked.refits), unknown, found, odd)
-    return replace(judged, refits=looked.refits)
+    refits = [*looked.refits.values()]
+    judged = _identifiable(model, seen, tests, with_refits(model, parameters, refits), unknown, found, odd)
+    return replace(judged, refits=refits)
 
 
-def _moved(parameters: Mapping[str, Value], refits: list[Refit]) -> list[str]:
-    """Parameters that a fit with something freed takes out of their intervals."""
-    ends = [refit.values() for refit in refits]
-    return [n for n, known in parameters.items() if any(not known.lower <= e[n].value <= known.upper for e in ends)]
+def _moved(parameters: Mapping[str, Value], looked: Findings, rows: int) -> list[str]:
+    """Return what the best significant suspects, so many rows being measured, take out of its interval.
+
+    Another reading of the data has no interval in common with the stated one: it moves all parameters.
+    """
+    best = {(s.name, s.kind) for s in looked.suspects if s.significant and s.equals(looked.suspects[0], rows)}
+    ends = [looked.refits[key].values() if key in looked.refits else {} for key in best]
+    return [
+        name
+        for name, known in parameters.items()
+        if any(name not in end or not known.lower <= end[name].value <= known.upper for end in ends)
+    ]
 
 
 def _refuted(tests: ResidualTests, looked: Findings, moved: list[str]) -> Judgement:

@@ -1,10 +1,10 @@
 """Where a model does not fit: which of the things taken as known would explain it.
 
 A wrong clock or an omitted mass is a fault that no fit of the parameters shows. Each candidate is freed in turn and the
-residual is regressed on its effect, the parameters following (a score test: Rao 1948); the most promising are then
-fitted together with the parameters, until one leaves no more than noise. A misfit that is a good part of the signal may
-also come from another reading of the numbers. Where nothing explains it, values of each candidate are tried over its
-whole range.
+residual is regressed on its effect, the parameters following; the most promising are then fitted together with the
+parameters, until one leaves no more than noise. A misfit that is a good part of the signal may also come from another
+reading of the numbers. Where nothing explains it, values of each candidate are tried over its whole range. Whatever is
+fitted becomes a row of the table of hypotheses, and one F-test decides about all of them.
 """
 
 from __future__ import annotations
@@ -25,18 +25,15 @@ from shoal.identification.judge.suspects.of_data import Reading, misfit, of_data
 from shoal.identification.judge.suspects.of_machine import of_machine
 from shoal.identification.judge.suspects.of_measurement import of_measurement
 from shoal.identification.judge.suspects.shaken import shaken
-from shoal.identification.judge.suspects.suspect import BY_CHANCE, Suspect, explains, penalty
+from shoal.identification.judge.suspects.suspect import Suspect, penalty
 from shoal.identification.methods.lanes import Descent, descend_many
 from shoal.identification.methods.starts import starting_points
 from shoal.identification.recording.units import of_channels
+from shoal.identification.spread.covariance import blocks_of
 from shoal.identification.spread.intervals import Refit
 from shoal.identification.spread.uncertainty import followed
 from shoal.trajectory import Array
 
-_MOST_OF = 0.75
-"""Of what the best explains, where the rest is noise: what explains less is not what is wrong."""
-_TRUE = 0.5
-"""Of what derivatives promise: a fit that gains less does not confirm it."""
 _FITTED = 8
 """Candidates that are fitted at a time."""
 _FOLLOWED = 3
@@ -71,14 +68,14 @@ _SMALL = 3.0
 
 @dataclass(frozen=True)
 class Findings:
-    """The suspects, those that explain most first, and the fits with each of them that is a number of the model.
+    """The suspects, those that explain most first, and by name and kind the fits of those that free numbers.
 
     better: a minimum of the model itself that fits better, if met; cut: whether time was up before all were tried
     hypotheses: the score tests, the most significant first
     """
 
     suspects: list[Suspect] = field(default_factory=list)
-    refits: list[Refit] = field(default_factory=list)
+    refits: dict[tuple[str, str], Refit] = field(default_factory=dict)
     better: Descent | None = None
     cut: bool = False
     hypotheses: list[Hypothesis] = field(default_factory=list)
@@ -114,83 +111,75 @@ def suspects(
 ) -> Findings:
     """Return what explains the residual at an answer, the best first. Runs are not counted.
 
-    noise: what no explanation can go below [RMS]; test: of the hypotheses, which are not tested without
+    noise: what no explanation can go below [RMS]; test: of the hypotheses, that of a model without error by default
     misfit: whether the residual is more than noise; else only what a score test finds is fitted
     Past the model's deadline it ends with what was found until then.
     """
-    search = _Search(model, point, residual, jacobian, noise)
-    cut, tested = True, list[Hypothesis]()
+    search = _Search(model, point, residual, jacobian, noise, test or ScoreTest.of(model, residual, jacobian))
+    cut = True
     with suppress(TimeIsUp):
-        simple = search.scores()
-        tested = table(test, search.measured) if test is not None else tested
-        if misfit:
-            search.run(simple)
-        else:
-            search.refute(simple, tested)
+        search.run(misfit)
         cut = False
     rows = len(residual)
     # Clock and gravity explain a free swing equally well: the order of equals is that of their names.
     told = (suspect for suspect in search.found if suspect.after < _CONSTANT * model.rows.signal)
     found = sorted(told, key=lambda s: (float(f"{s.cost(rows):.2e}"), s.name))
     listed = [suspect for suspect in found if suspect.after <= _FAR * found[0].after]
-    refits = [search.refits[s.name, s.kind] for s in listed if (s.name, s.kind) in search.refits]
+    refits = {(s.name, s.kind): search.refits[s.name, s.kind] for s in listed if (s.name, s.kind) in search.refits}
     named = [replace(s, alike=search.alike(s.name)) for s in listed]
-    return Findings(named, refits, search.better, cut, tested)
+    return Findings(named, refits, search.better, cut, search.hypotheses)
 
 
 class _Search:
     """One search, whose finds stay when its time is up."""
 
-    def __init__(self, model: ForwardModel, point: Array, residual: Array, jacobian: Array, noise: float) -> None:
+    def __init__(
+        self, model: ForwardModel, point: Array, residual: Array, jacobian: Array, noise: float, test: ScoreTest
+    ) -> None:
         self.model = model.aside()
-        self.point, self.residual, self.noise = point, residual, noise
+        self.point, self.residual, self.noise, self.test = point, residual, noise, test
         self.before = misfit(residual)
-        self.by_chance = BY_CHANCE
+        self.scored: list[Hypothesis] = []
+        self.fits: dict[tuple[str, str], tuple[Suspect, Hypothesis]] = {}
+        self.tests = 1.0
         self.basis, self.inverse = followed(jacobian)
-        self.found: list[Suspect] = []
         self.refits: dict[tuple[str, str], Refit] = {}
         self.effects: dict[str, Array] = {}
         self.measured: dict[tuple[str, str, int], list[Array]] = {}
-        self.simple: list[Candidate] = []
         self.ends: list[tuple[float, Array]] = []
         self.unfinished: list[tuple[float, Candidate, Array]] = []
         self.better: Descent | None = None
 
-    def scores(self) -> list[_Scored]:
-        """Measure the effects of all candidates that one call can try; those that promise something, the best first."""
-        self.simple = [*of_measurement(self.model), *of_machine(self.model)]
-        return self._promising(self.simple)
+    @property
+    def hypotheses(self) -> list[Hypothesis]:
+        """The table: of each hypothesis its fit if there was one, else its score test; the most significant first."""
+        rows = [row for row in self.scored if (row.name, row.kind) not in self.fits]
+        return sorted([*rows, *(row for _, row in self.fits.values())], key=lambda row: (row.chance, row.name))
 
-    def refute(self, scored: list[_Scored], tested: list[Hypothesis]) -> None:
-        """Fit what a score test finds in a residual that else is noise, and keep what explains most of it."""
-        drops = {(row.name, row.kind): row.drop for row in tested if row.significant}
-        least = _MOST_OF * max(drops.values(), default=np.inf)
-        wrong = [s for s in scored if drops.get((s.candidate.name, s.candidate.kind), 0.0) >= least]
-        if not wrong:
+    def run(self, misfit: bool) -> None:
+        """Test all candidates; where one is significant, or there is a misfit, fit what promises to explain it.
+
+        Candidates near the answer, other readings, those that take long, those far from it; then whether a better
+        minimum was met.
+        """
+        simple = [*of_measurement(self.model), *of_machine(self.model)]
+        scored = self._promising(simple)
+        self.scored, self.tests = table(self.test, self.measured)
+        significant = {(row.name, row.kind) for row in self.scored if row.significant}
+        if not misfit and not significant:
             return
-        promised = self.before**2 * max(row.explained for row in tested if row.significant)
-        self.noise = float(np.sqrt(max(self.before**2 - _TRUE * promised, 0.0)))
-        self.by_chance = 0.0  # the test has seen to that
-        self._fit(wrong[:_FITTED])
-        self._follow()
-        gained = self.before**2 - self._least**2
-        self.found = [s for s in self.found if self.before**2 - s.after**2 >= _MOST_OF * gained]
-        self._look_back()
-
-    def run(self, scored: list[_Scored]) -> None:
-        """Candidates near the answer, other readings, candidates far from it; then whether a better minimum was met."""
-        simple = self.simple
         self._free_bounds()
-        by_bounds = self._explained
-        if by_bounds:
+        if self._explained:
             return
-        self._try(scored)
+        self._try([s for s in scored if s.promise < _HOPELESS or (s.candidate.name, s.candidate.kind) in significant])
         gross = _GROSS * self.model.rows.signal
-        if self.before > gross > 0.0 and not self._explained:
+        if self.before > gross > 0.0:
             self._read()
-        if self.model.scene.dimensions == 2 and not self._explained and self.before > self.noise:
-            for dear in (shaken(self.model), bending(self.model)):
-                self._fit(self._near([s for s in self._promising([*dear]) if s.promise < _HOPELESS])[:_DEAR])
+        if self.model.scene.dimensions == 2 and not self._explained:
+            for dear in ([*shaken(self.model)], [*bending(self.model)]):
+                self.tests += sum(len(candidate.probes) for candidate in dear)
+                better = [s for s in self._promising(dear) if s.promise * self.before < self._least]
+                self._fit(self._near(better)[:_DEAR])
         # What lies near an answer that leaves little shows in the regression.
         if self._least > gross and not self._explained:
             places = np.vstack([self.point, starting_points(self.model)[:3]])
@@ -207,7 +196,6 @@ class _Search:
 
     def _try(self, scored: list[_Scored]) -> None:
         """Fit the most promising, then the next ones, until one explains the misfit wholly."""
-        scored = [s for s in scored if s.promise < _HOPELESS]
         # A small fault does what its derivative says, a large one may do better.
         scored = scored if self.before > _GROSS * self.model.rows.signal else self._near(scored)
         for k in range(0, len(scored), _FITTED):
@@ -230,6 +218,11 @@ class _Search:
             return ()
         same = (other for other, effect in self.effects.items() if abs(float(mine @ effect)) > _ALIKE)
         return tuple(other for other in same if other != name)
+
+    @property
+    def found(self) -> list[Suspect]:
+        """The fits that explain the residual."""
+        return [suspect for suspect, row in self.fits.values() if row.explains]
 
     @property
     def _least(self) -> float:
@@ -320,13 +313,9 @@ class _Search:
         wider = without_bounds(self.model, which)
         starts = np.vstack([self.point, starting_points(wider)[:3]])
         end = min(descend_many(wider, starts, patience=_PATIENCE), key=lambda one: one.fitness)
-        after = misfit(end.residual)
-        if explains(self.before, after, self.noise, len(self.residual)):
-            outside = [k for k in which if not self.model.lower[k] <= end.point[k] <= self.model.upper[k]]
-            for k in outside:
-                bound, value, change = told(self.model, self.point, end.point, k)
-                name, unit = f"bound of {self.model.names[k]}", of_channels(self.model.measurement)
-                self.found.append(Suspect(name, bound, value, self.before, after, change, unit, "bounds", 0))
+        for k in [k for k in which if not self.model.lower[k] <= end.point[k] <= self.model.upper[k]]:
+            bound, value, change = told(self.model, self.point, end.point, k)
+            self._test(f"bound of {self.model.names[k]}", "bounds", 0, bound, value, change, end)
 
     def _follow(self) -> None:
         """Descend on where a fit was the best but for what it had still to go."""
@@ -342,16 +331,41 @@ class _Search:
         self.ends.append((after, end.point[:known]))
         if not end.converged:
             self.unfinished.append((after, candidate, end.point))
-        if not explains(self.before, after, self.noise, len(self.residual), self.by_chance):
-            return
         value, change = candidate.told(values)
         stated = 0.0 if candidate.tell else candidate.stated[0]
-        told = (candidate.name, stated, value, self.before, after, change, of_channels(self.model.measurement))
-        suspect = Suspect(*told, candidate.kind, len(values))
-        rivals = [other for other in self.found if other.name == suspect.name and other.kind == suspect.kind]
-        if all(suspect.after < other.after for other in rivals):
-            self.found = [*(other for other in self.found if other not in rivals), suspect]
-            self.refits[suspect.name, suspect.kind] = Refit(free, end.point, end.residual, end.jacobian)
+        if self._test(candidate.name, candidate.kind, len(values), stated, value, change, end):
+            self.refits[candidate.name, candidate.kind] = Refit(free, end.point, end.residual, end.jacobian)
+
+    def _test(
+        self,
+        name: str,
+        kind: str,
+        numbers: int,
+        stated: float,
+        value: float,
+        change: str,
+        end: Descent,
+        read: ForwardModel | None = None,
+    ) -> bool:
+        """Make a fit a row of the table; return whether it is the best of its name and explains the residual.
+
+        numbers: that it frees, 0 for another reading or a bound; read: the model where it reads the data otherwise
+        """
+        share = 1.0 if read is None else self.model.rows.signal / read.rows.signal
+        residual, jacobian, others = share * end.residual, share * end.jacobian, None
+        after, known = misfit(residual), self.fits.get((name, kind))
+        if not after < (np.inf if known is None else known[0].after):
+            return False
+        if read is None:
+            residual = residual - (self.residual - self.test.residual)
+        else:
+            others = blocks_of(read, len(residual))
+        drop, chance, explained = self.test.fit(residual, jacobian, max(numbers, 1), others)
+        row = Hypothesis(name, kind, numbers, drop, chance, min(1.0, self.tests * chance), explained, fitted=True)
+        unit = of_channels(self.model.measurement)
+        suspect = Suspect(name, stated, value, self.before, after, change, unit, kind, numbers, row.corrected)
+        self.fits[name, kind] = suspect, row
+        return row.explains
 
     def _read(self) -> None:
         """Fit the readings that begin best, each from its own starts; misfits count against the spread of the data."""
@@ -364,11 +378,11 @@ class _Search:
             begun.append(
                 (float(np.min(costs)) / reading.model.rows.signal**2, len(begun), reading, starts[np.argsort(costs)])
             )
+        self.tests += len(begun)
         for _, _, reading, starts in sorted(begun, key=lambda entry: entry[:2])[:_READ]:
             ends = descend_many(reading.model, starts[:3], patience=_PATIENCE)
-            after = min(misfit(end.residual) for end in ends) * self.model.rows.signal / reading.model.rows.signal
-            if explains(self.before, after, self.noise, len(self.residual)):
-                self.found.append(_of_reading(reading, self.before, after, of_channels(self.model.measurement)))
+            end = min(ends, key=lambda one: misfit(one.residual))
+            self._test(reading.name, "data", 0, 1.0, reading.value, reading.change, end, reading.model)
 
     def _look_back(self) -> None:
         """Return whether the refits met a better minimum: what was freed goes back to its stated value."""
@@ -379,7 +393,3 @@ class _Search:
         best = min(ends, key=lambda end: end.fitness)
         if misfit(best.residual) < _BETTER * self.before:
             self.better = best
-
-
-def _of_reading(reading: Reading, before: float, after: float, unit: str) -> Suspect:
-    return Suspect(reading.name, 1.0, reading.value, before, after, reading.change, unit, "data")

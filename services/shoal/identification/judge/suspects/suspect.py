@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-SEVERAL = 2.0
-"""Times smaller: a misfit beyond the noise that falls by this factor is explained."""
+from shoal.identification.judge.hypotheses import SIGNIFICANT
+
 _CHANCE = 10.83
 """By how much one more parameter lowers a chi-square by chance once in a thousand times."""
-BY_CHANCE = 2 * _CHANCE
-"""The same of the best of many."""
 
 
 @dataclass(frozen=True)
@@ -19,6 +17,7 @@ class Suspect:
     change: the two values in words; unit: of the misfits, empty where channels of different units are taken together
     kind: `measurement`, `machine`, `data` (another reading of the recorded numbers) or `bounds` (of what is sought)
     numbers: how many were fitted beyond what is sought
+    chance: p-value of what it explains, corrected for all hypotheses that were tested
     alike: other candidates of which a small fault has the same effect, whatever is measured by these channels
     """
 
@@ -31,7 +30,13 @@ class Suspect:
     unit: str = ""
     kind: str = "measurement"
     numbers: int = 1
+    chance: float = 1.0
     alike: tuple[str, ...] = ()
+
+    @property
+    def significant(self) -> bool:
+        """Return whether the data contradict what was taken as known."""
+        return self.chance < SIGNIFICANT
 
     @property
     def words(self) -> str:
@@ -58,13 +63,3 @@ class Suspect:
 def penalty(numbers: int, rows: int) -> float:
     """A factor on a mean square, for numbers beyond the first that were fitted to so many rows (Schwarz 1978)."""
     return float(rows ** ((numbers - 1) / rows))
-
-
-def explains(before: float, after: float, noise: float, rows: int, by_chance: float = BY_CHANCE) -> bool:
-    """Return whether a misfit that falls so, of so many rows with that noise, is explained: severalfold, not by chance.
-
-    by_chance: of chi-square, how far noise alone may lower it
-    """
-    beyond = max(after**2 - noise**2, 0.0)
-    severalfold = after * SEVERAL <= before or beyond * SEVERAL**2 <= before**2 - noise**2
-    return severalfold and (before**2 - after**2) * rows > by_chance * max(after, noise) ** 2
