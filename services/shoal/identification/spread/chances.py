@@ -78,13 +78,14 @@ def above_f(count: float, freedom: float, ratio: float) -> float:
         return 1.0
     if math.isinf(freedom):
         return above_chi_square(count, count * ratio)
-    a, b, x = 0.5 * freedom, 0.5 * count, freedom / (freedom + count * ratio)
+    total = freedom + count * ratio
+    a, b, x, y = 0.5 * freedom, 0.5 * count, freedom / total, count * ratio / total  # x + y = 1, either may vanish
     log_beta = math.lgamma(a) + math.lgamma(b) - math.lgamma(a + b)
-    power = math.exp(a * math.log(x) + b * math.log1p(-x) - log_beta)
+    power = math.exp(a * math.log(x) + b * math.log(y) - log_beta) if x * y > 0.0 else 0.0
     # Of the incomplete beta function, that side whose fraction converges.
     if x < (a + 1.0) / (a + b + 2.0):
         return power / a / _fraction(1.0, _beta(a, b, x))
-    return 1.0 - power / b / _fraction(1.0, _beta(b, a, 1.0 - x))
+    return 1.0 - power / b / _fraction(1.0, _beta(b, a, y))
 
 
 def _student(freedom: float, t: float) -> tuple[float, float]:
