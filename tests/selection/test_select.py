@@ -16,10 +16,10 @@ from shoal.engines.gauss import GaussEngine
 from shoal.errors import InputError
 from shoal.scene import Scene, load_scene
 from shoal.selection import select
-from shoal.selection.climb import climb, settled
 from shoal.selection.levels import LADDERS, RIGID, below, cable, quintic
 from shoal.selection.prior import estimate
-from shoal.selection.run import Rung, distance
+from shoal.selection.refine import refine, settled
+from shoal.selection.run import Candidate, distance
 from shoal.selection.work import INTEGRATOR, Forecast
 from shoal_validation.problems import get_problem
 from shoal_validation.selection.machines import draw
@@ -60,7 +60,7 @@ def test_stiff_rods_bend_by_a_few_modes_and_keep_their_word_against_exudyn() -> 
     selection = select(scene, 1e-3)
     assert selection.met
     assert {level.element for level in selection.chosen.levels.values()} == {"modal"}
-    assert selection.trajectory.steps < selection.rungs[0].trajectory.steps / 50
+    assert selection.trajectory.steps < selection.candidates[0].trajectory.steps / 50
     cables = scene.with_values({"bodies.OA.elements": 8, "bodies.AB.elements": 8, "solver.step": 2e-4})
     theirs = get_engine("exudyn").simulate(cables, selection.trajectory.times)
     assert theirs.ok, theirs.message
@@ -74,7 +74,7 @@ def test_rods_with_shear_bend_by_modes_where_that_is_enough() -> None:
     assert found.met
     assert "shear and rotary inertia" in found.reason
     assert {level.element for level in found.chosen.levels.values()} == {"modal"}
-    sheared = [rung.work for rung in found.rungs if "reissner" in rung.name]
+    sheared = [candidate.work for candidate in found.candidates if "reissner" in candidate.name]
     assert found.chosen.work < min(sheared) / 100
     fine = {f"bodies.{rod}.{field}": value for rod in found.limits
             for field, value in (("element", "simo-reissner"), ("elements", 8))}  # fmt: skip
@@ -84,7 +84,7 @@ def test_rods_with_shear_bend_by_modes_where_that_is_enough() -> None:
 
 
 def test_rods_with_damping_have_models_too() -> None:
-    """Cables of them have no reduced quadrature. Judged by twice as many quintic elements as the yardstick's."""
+    """Cables of them have no reduced quadrature. Judged by twice as many quintic elements as the reference's."""
     damped = _with_modulus(2e8).with_values({f"bodies.{rod}.retardation": 1e-3 for rod in ("OA", "AB")})
     selection = select(damped.with_values({"solver.duration": 0.3}), 1e-3)
     assert selection.met
@@ -111,15 +111,15 @@ def test_a_stiff_rod_and_a_soft_one_are_told_apart() -> None:
 def test_very_stiff_rods_are_judged_without_a_flexible_run() -> None:
     selection = select(_with_modulus(2e16), 1e-2)
     assert set(selection.rigid) == {"OA", "AB"}
-    assert all(level == RIGID for rung in selection.rungs for level in rung.levels.values())
+    assert all(level == RIGID for candidate in selection.candidates for level in candidate.levels.values())
 
 
 def test_ladder_says_what_was_tried_and_why_it_stopped() -> None:
     data = select(HEADLINE, 1e-2).to_json()
     assert data["status"] == "met"
-    assert sum(rung["chosen"] for rung in data["rungs"]) == 1
-    assert all(rung["wall_s"] > 0 and rung["steps"] > 0 for rung in data["rungs"])
-    assert "yardstick" in data["reason"]
+    assert sum(candidate["chosen"] for candidate in data["rungs"]) == 1
+    assert all(candidate["wall_s"] > 0 and candidate["steps"] > 0 for candidate in data["rungs"])
+    assert "reference" in data["reason"]
     assert data["estimated_error"] <= 1e-2
 
 
@@ -141,7 +141,7 @@ def test_chaos_is_owned_up_to() -> None:
 def test_what_would_take_too_long_is_not_tried_and_not_met() -> None:
     selection = select(_with_modulus(1e19), 1e-9, patience=5.0)
     assert not selection.met
-    assert all(level == RIGID for rung in selection.rungs for level in rung.levels.values())
+    assert all(level == RIGID for candidate in selection.candidates for level in candidate.levels.values())
     assert "element steps, about" in selection.trajectory.message
 
 
@@ -160,19 +160,19 @@ def test_a_torque_that_folds_a_rod_ends_the_search() -> None:
     found = select(machine.scene, machine.tolerance)
     assert not found.met
     assert found.trajectory.message.startswith("the torque load bends A to a strain of 3.1 at its surface")
-    assert not any("reissner" in rung.name for rung in found.rungs)
+    assert not any("reissner" in candidate.name for candidate in found.candidates)
 
 
 def test_the_way_down_takes_a_share_of_the_work_of_the_climb(monkeypatch: pytest.MonkeyPatch) -> None:
     """But for the run that it is at when that much is done; what is found by then meets the tolerance."""
     scene = _with_modulus(2e7).with_values({"solver.duration": 0.2})
     free = select(scene, 1e-4)
-    monkeypatch.setattr("shoal.selection.trim.SEARCH", 0.0)
-    monkeypatch.setattr("shoal.selection.trim.SHARE", 0.2)
+    monkeypatch.setattr("shoal.selection.coarsen.SEARCH", 0.0)
+    monkeypatch.setattr("shoal.selection.coarsen.SHARE", 0.2)
     bound = select(scene, 1e-4)
-    climbed = select(scene, 1e-4, trimmed=False)
+    climbed = select(scene, 1e-4, coarsened=False)
     assert all(found.met for found in (free, bound, climbed))
-    work = [sum(rung.work for rung in found.rungs) for found in (climbed, bound, free)]
+    work = [sum(candidate.work for candidate in found.candidates) for found in (climbed, bound, free)]
     assert work[0] < work[1] < work[2]
     assert bound.chosen.work <= climbed.chosen.work
 
@@ -241,8 +241,8 @@ class At:
     ],
 )
 def test_what_is_left_is_told_by_how_fast_the_distances_fell(places: list[float], left: float) -> None:
-    rungs: Any = [SimpleNamespace(trajectory=At(x), levels={}) for x in places]
-    assert settled(rungs)[0] == pytest.approx(left)
+    candidates: Any = [SimpleNamespace(trajectory=At(x), levels={}) for x in places]
+    assert settled(candidates)[0] == pytest.approx(left)
 
 
 class Meshes:
@@ -259,24 +259,24 @@ class Meshes:
 
     def __call__(self, levels: Any, *_: Any) -> Any:
         elements = {rod: level.elements for rod, level in levels.items()}
-        return Rung(levels, HEADLINE, At(self.error(**elements)), 0.0)  # type: ignore[arg-type]
+        return Candidate(levels, HEADLINE, At(self.error(**elements)), 0.0)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("fall", [1.4, 1.9, 3.0, 8.0])
 def test_a_climb_tells_no_less_than_the_error_that_is_left(fall: float) -> None:
     """Errors that fall slowly with every doubling: neighbours agree long before the error is small."""
     meshes: Any = Meshes(lambda A: fall ** -np.log2(A))
-    found: Any = climb(meshes, ("A",), {}, 0.5)
-    assert found.rung.trajectory.x <= 1.001 * found.error
+    found: Any = refine(meshes, ("A",), {}, 0.5)
+    assert found.candidate.trajectory.x <= 1.001 * found.error
     assert found.error <= 0.25
 
 
 def test_rods_that_are_left_behind_are_part_of_the_error() -> None:
     """Rod B is refined no more after the second mesh, which is still 0.01 m off."""
     meshes: Any = Meshes(lambda A, B: 0.9 * A**-2.0 + 0.02 / B)
-    found: Any = climb(meshes, ("A", "B"), {}, 0.2)
-    assert found.rung.levels["B"].elements == 2
-    assert found.rung.trajectory.x <= 1.001 * found.error
+    found: Any = refine(meshes, ("A", "B"), {}, 0.2)
+    assert found.candidate.levels["B"].elements == 2
+    assert found.candidate.trajectory.x <= 1.001 * found.error
 
 
 @pytest.mark.slow
@@ -289,7 +289,7 @@ def test_a_soft_rod_that_kinks_is_met_by_a_mesh_that_follows_it() -> None:
     found = select(machine.scene, machine.tolerance)
     assert found.met
     assert "no theory of rods holds beyond 1" in found.reason
-    assert any(rung.role == "yardstick" and not rung.ok for rung in found.rungs)
+    assert any(candidate.role == "reference" and not candidate.ok for candidate in found.candidates)
     fine = {f"bodies.{rod}.element": "simo-reissner" for rod in "ABC"} | {
         f"bodies.{rod}.elements": 128 for rod in "ABC"
     }
@@ -348,8 +348,8 @@ def test_ancf_full_is_a_theory_of_its_own() -> None:
     selection = select(HEADLINE.with_values(thick), 2e-2)
     assert selection.met
     assert {level.element for level in selection.chosen.levels.values()} == {"ancf-full"}
-    yardstick = [rung for rung in selection.rungs if rung.role == "yardstick"][-1]
-    assert distance(selection.chosen.trajectory, yardstick.trajectory) <= 2e-2
+    reference = [candidate for candidate in selection.candidates if candidate.role == "reference"][-1]
+    assert distance(selection.chosen.trajectory, reference.trajectory) <= 2e-2
 
 
 @pytest.mark.parametrize("levels", [(cable(2), cable(4)), (quintic(1), quintic(8)), (quintic(4), quintic(2))])

@@ -11,9 +11,9 @@ from shoal.selection import select
 from shoal.selection.levels import apply, cable
 from shoal_validation.selection.chart import draw_chart
 from shoal_validation.selection.machines import draw
+from shoal_validation.selection.reliability import judge
 from shoal_validation.selection.report import section
 from shoal_validation.selection.study import Case, study
-from shoal_validation.selection.told import told
 
 FEW, LONG = (1, 11, 14), (9, 21, 24)
 """Machines of one and two rods, stiff and soft."""
@@ -102,12 +102,12 @@ def test_every_tenth_machine_keeps_its_word() -> None:
 
 @pytest.mark.parametrize("seed", [9, 45])
 def test_told_errors_cover_the_true_ones(seed: int) -> None:
-    found = told(seed)
+    found = judge(seed)
     assert found is not None
     assert found.met
-    for said, true in (found.answer, found.yardstick):
+    for said, true in (found.answer, found.reference):
         assert 0 < true <= said
 
 
 def test_machines_whose_truth_takes_too_much_are_passed_over() -> None:
-    assert told(9, most=1.0) is None
+    assert judge(9, most=1.0) is None

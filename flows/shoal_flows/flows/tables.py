@@ -90,7 +90,10 @@ def of_equilibrium(found: Equilibrium) -> str:
 
 def of_selection(found: Selection) -> str:
     """Every model that was tried, and why the chosen one."""
-    rows = ((rung.name, rung.role, rung.error, "chosen" if rung is found.chosen else "") for rung in found.rungs)
+    rows = (
+        (candidate.name, candidate.role, candidate.error, "chosen" if candidate is found.chosen else "")
+        for candidate in found.candidates
+    )
     return table(("model", "role", "estimated error [m]", ""), rows) + f"\n\n{found.reason}; error {found.errors}"
 
 

@@ -49,7 +49,7 @@ def log_selection(found: Selection, album: Mapping[str, bytes]) -> str:
         run.params({"tolerance": found.tolerance, "chosen": found.chosen.name})
         run.metric("final/estimated_error", found.chosen.error)
         log_errors(run, found.errors)
-        run.metric("final/rungs", len(found.rungs))
+        run.metric("final/rungs", len(found.candidates))
         run.text(json_text(found.to_json(), indent=1), "selection.json")
         for file, content in album.items():
             run.picture(content, file)

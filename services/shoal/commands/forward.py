@@ -56,7 +56,7 @@ def simulate(
     check_estimated(tolerance, verify)
     if tolerance is not None:
         from shoal.selection import select
-        from shoal.selection.climb import PATIENCE
+        from shoal.selection.refine import PATIENCE
 
         if engine != "gauss":
             raise InputError(f"--tolerance: models are chosen for engine gauss only, found --engine {engine}")

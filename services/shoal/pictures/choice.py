@@ -23,7 +23,7 @@ def tells_places(motion: Trajectory, found: Selection | None = None) -> bool:
 def why(found: Selection) -> list[str]:
     """The reasons of the choice, in sentences."""
     taken = found.chosen.name if found.met else "none"
-    reasons = [f"Of {len(found.rungs)} models, {taken} was taken: {found.reason}."]
+    reasons = [f"Of {len(found.candidates)} models, {taken} was taken: {found.reason}."]
     reasons += [f"{rod} stays rigid: {reason}." for rod, reason in found.rigid.items()]
     if found.shear > found.tolerance:
         reasons.append(f"Shear and rotary inertia, which the beams leave out, are worth about {length(found.shear)}.")
@@ -33,12 +33,18 @@ def why(found: Selection) -> list[str]:
 def rows(found: Selection) -> list[list[str]]:
     """Every model that was run: name, unknowns, steps, time [ms], error [m], what came of it."""
     table = []
-    for rung in found.rungs:
-        verdict = str(rung.trajectory.status[0]) if not rung.ok else ""
-        if rung is found.chosen:
+    for candidate in found.candidates:
+        verdict = str(candidate.trajectory.status[0]) if not candidate.ok else ""
+        if candidate is found.chosen:
             verdict = "chosen" if found.met else verdict or "nearest"
-        name = f"{rung.name}, tolerance {rung.tolerance:g}" if np.isfinite(rung.tolerance) else rung.name
-        error = f"{rung.error:.1e}" if np.isfinite(rung.error) else "–"
-        cost = f"{rung.trajectory.wall_s * 1e3:.1f}"
-        table.append([name, str(rung.trajectory.model["unknowns"]), str(rung.trajectory.steps), cost, error, verdict])
+        name = (
+            f"{candidate.name}, tolerance {candidate.tolerance:g}"
+            if np.isfinite(candidate.tolerance)
+            else candidate.name
+        )
+        error = f"{candidate.error:.1e}" if np.isfinite(candidate.error) else "–"
+        cost = f"{candidate.trajectory.wall_s * 1e3:.1f}"
+        table.append(
+            [name, str(candidate.trajectory.model["unknowns"]), str(candidate.trajectory.steps), cost, error, verdict]
+        )
     return table

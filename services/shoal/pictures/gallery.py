@@ -69,7 +69,7 @@ def model_choice(answer: Answer) -> Drawn:
     view, stage = answer.view(name), answer.estimate.model["selection"][-1]
     times = view["clock"] * recordings[name].times + view["delay"]
     found = select(answer.estimate.scenes[name], stage["tolerance"], np.maximum(times, 0.0))
-    alt = f"Estimated error over the cost of a run for {len(found.rungs)} models; {found.chosen.name} is taken."
+    alt = f"Estimated error over the cost of a run for {len(found.candidates)} models; {found.chosen.name} is taken."
     caption = f"Models tried at the answer; it was found with {stage['model']}. {' '.join(why(found))}"
     return Drawn("ladder", ladder(found), alt, caption)
 

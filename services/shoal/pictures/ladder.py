@@ -12,22 +12,26 @@ from shoal.pictures.style import BLACK, BLUE, VERMILION, canvas, headline, log_t
 
 if TYPE_CHECKING:
     from shoal.selection import Selection
-    from shoal.selection.run import Rung
+    from shoal.selection.run import Candidate
 
 
 @styled
 def ladder(found: Selection) -> Figure:
     """Estimated error at the markers over the cost of a run, both logarithmic; below the dashed line is good enough."""
     figure, axes = canvas(4.4)
-    others = [rung for rung in found.rungs if rung is not found.chosen and np.isfinite(rung.error) and rung.error > 0]
+    others = [
+        candidate
+        for candidate in found.candidates
+        if candidate is not found.chosen and np.isfinite(candidate.error) and candidate.error > 0
+    ]
     look = {"linestyle": "none", "markeredgecolor": "black"}
     axes.plot(
-        [_cost(rung) for rung in others],
-        [rung.error for rung in others],
+        [_cost(candidate) for candidate in others],
+        [candidate.error for candidate in others],
         marker="o",
         color=BLUE,
         markersize=7,
-        label=f"other models with a known error ({len(others)} of {len(found.rungs) - 1})",
+        label=f"other models with a known error ({len(others)} of {len(found.candidates) - 1})",
         **look,
     )
     chosen = found.chosen
@@ -47,9 +51,9 @@ def ladder(found: Selection) -> Figure:
     return figure
 
 
-def _cost(rung: Rung) -> float:
+def _cost(candidate: Candidate) -> float:
     """Steps times unknowns: unlike a time it is the same on every machine, under any load."""
-    return float(rung.trajectory.steps * rung.trajectory.model["unknowns"])
+    return float(candidate.trajectory.steps * candidate.trajectory.model["unknowns"])
 
 
 def _says(found: Selection) -> str:

@@ -35,7 +35,7 @@ def drawn(trajectory: Trajectory, scene: Scene, moving: Motion, selection: Selec
     """What the page shows on paper: poses, paths and, of a chosen model, the ladder."""
     pictures = [_poses(trajectory, scene, moving), _paths(trajectory, scene, moving)]
     if selection is not None:
-        tried, name = len(selection.rungs), selection.chosen.name
+        tried, name = len(selection.candidates), selection.chosen.name
         alt = f"Estimated error over the cost of a run for {tried} models; {name} is taken."
         pictures.append(
             Drawn("ladder", ladder(selection), alt, "Left is cheaper, below the dashed line is good enough.")

@@ -1,4 +1,4 @@
-"""What a user states: bodies, joints, loads, markers, initial state, gravity and solver settings, in SI units."""
+"""The scene of a user: bodies, joints, loads, markers, initial state, gravity and solver settings, in SI units."""
 
 from shoal.scene.bodies import FRAMED, Body, Rod
 from shoal.scene.function import Function

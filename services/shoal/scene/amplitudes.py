@@ -1,4 +1,4 @@
-"""What may be said of bodies that bend by modes: their amplitudes at the start, and places on those of given modes."""
+"""Checks of modal bodies: amplitudes at the start, and points on bodies with given modes."""
 
 from __future__ import annotations
 

@@ -62,8 +62,8 @@ class Rod(Record):
     are stated where the section has them. `element` is the model of the rod, with `elements` elements of equal length:
     `rigid`, `ancf-cable` (cubic, Bernoulli-Euler), `ancf-quintic` (the same of higher order), `simo-reissner` (with
     shear) or `ancf-full` (with shear and stretch of the section). `rigid` where nothing else is stated that only a
-    flexible rod has. `rotary_inertia`: whether a rigid rod has that of its height; the paper's has not, nor have cables
-    and quintic elements, while simo-reissner and ancf-full always have. `quadrature` of a cable is `full` (Gauss, 5
+    flexible rod has. `rotary_inertia`: whether the height of a rigid rod counts in its inertia: not in the paper, in
+    cables and quintic elements, but always in simo-reissner and ancf-full. `quadrature` of a cable is `full` (Gauss, 5
     points axial and 3 bending) or `reduced` (3 Lobatto points axial, 2 Gauss points bending). `law` is that of
     ancf-full. `curvature` [1/m, 1/m^2, ...]: polynomial of the curvature of the unstrained axis over its arc length.
     `end_height`, `end_width`: those at the far end of a tapered rod, along which they change evenly (each element has
@@ -72,9 +72,9 @@ class Rod(Record):
     the section, `side_curvature` [1/m, ...] bends the unstrained axis towards its local z axis and `twist` [rad/m, ...]
     turns its sections, both polynomials over the arc length. `director`: the axis of the section that its nodes carry,
     by default the one that a joint can share.
-    `modal` bends little in a frame that moves with it, in the plane, by so many `modes`, the eigenmodes of a uniform
-    rod whose `ends` are held in that frame as the joints hold them, or as stated. It stretches by so many
-    `axial_modes`: evenly, then by the same shapes taken along it.
+    `modal` bends little in a frame that moves with it, in the plane, by `modes` eigenmodes of a uniform rod
+    whose `ends` are held in that frame as the joints hold them, or as stated. It stretches by `axial_modes`
+    shapes: evenly, then the same eigenmodes taken along it.
     """
 
     kind: Literal["rod"] = "rod"
@@ -198,7 +198,7 @@ class Rod(Record):
         return self
 
     def _largest_turn(self) -> float:
-        """Of the unstrained section about the axis, from one end of an element to the other [rad]."""
+        """Return the largest twist of the unstrained section over an element [rad]."""
         ends = [self.length * k / self.elements for k in range(self.elements + 1)]
         turns = [sum(k * s ** (power + 1) / (power + 1) for power, k in enumerate(self.twist)) for s in ends]
         return max(abs(after - before) for before, after in pairwise(turns))
@@ -220,13 +220,13 @@ class Rod(Record):
 
     @property
     def mesh(self) -> dict[str, int]:
-        """The fields that tell how finely a flexible rod is divided, and their numbers."""
+        """Return the fields that define the mesh of a flexible rod, and their numbers."""
         if self.element == "modal":
             return {"modes": self.modes, "axial_modes": self.axial_modes}
         return {} if self.element == "rigid" else {"elements": self.elements}
 
     def by_elements(self, element: str, count: int) -> dict[str, Any]:
-        """The fields that make a rod of so many elements of it, whatever it was before."""
+        """Return the fields that give this rod `count` elements of a kind."""
         fields: dict[str, Any] = {"element": element, "elements": count}
         if self.element == "modal":
             fields |= {name: _ONLY_FLEXIBLE[name] for name in ("modes", "axial_modes", "ends")}

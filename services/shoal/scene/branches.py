@@ -1,8 +1,8 @@
-"""Where an expression jumps or has a kink, exactly, and the smooth expressions between these places.
+"""Breakpoints of an expression (jumps and kinks), exactly, and the smooth expressions between them.
 
 step, ramp, abs, min and max switch where an argument (or a difference of two) passes a number. These roots are
 isolated by interval arithmetic (`enclosure`): an interval holds none where the bounds of the argument exclude 0; where
-those of its derivative do, the signs at its ends tell; anything else is bisected. A root is then the first
+those of its derivative do, the signs at its ends decide; other intervals are bisected. A root is then the first
 double-precision number at which the argument, as computed, is no longer on its old side. Poles of quotients,
 logarithms, powers and tangents are sought in the same way and refused.
 """
@@ -48,9 +48,9 @@ class Branches(NamedTuple):
 
 
 def branches(node: Node, begin: float, end: float) -> Branches:
-    """A tree in smooth pieces over [begin, end].
+    """Split a tree into smooth pieces over [begin, end].
 
-    Raises InputError where it has a pole or no value, or where its switches cannot be told apart.
+    Raises InputError where it has a pole or no value, or where its switches cannot be separated.
     """
     return _Cutter(node, begin, end).cut(node)
 
@@ -162,7 +162,7 @@ class _Cutter:
         return np.concatenate([self._refined(node, lower, upper), found])
 
     def _undecided(self, operation: str, node: Node, lower: Array, upper: Array) -> list[float]:
-        """What to do with places as short as rounding at which a tree may touch 0 or pass it."""
+        """Decide about intervals of the width of round-off in which a tree may touch or cross 0."""
         if operation in ("/", "log", "**", "tan", "sqrt"):
             return [float(t) for t in lower]
         found = []
@@ -201,7 +201,7 @@ def _is_zero(node: Node, t: float) -> bool:
 
 
 def _values(node: Node, t: Array, side: int = 0) -> Array:
-    """Values in the best precision; side: where one is none, take it so many neighbours farther right or left."""
+    """Return values in the best precision; side: where one is undefined, of the `side`-th neighbour on the right."""
     t = np.asarray(t, dtype=np.longdouble)
     found = np.array(np.broadcast_to(value(node, t), t.shape))
     if side and not np.all(np.isfinite(found)):
@@ -216,7 +216,7 @@ def _number(edges: Array, finer: Array) -> Array:
 
 
 def _branch(operation: str, test: float, *arguments: Node) -> Node:
-    """What an operation amounts to where the tested number has the sign of `test`."""
+    """Return the smooth expression of an operation where the tested number has the sign of `test`."""
     first = arguments[0]
     if operation == "step":
         return 1.0 if test >= 0 else 0.0

@@ -1,4 +1,4 @@
-"""What a scene in the plane cannot say, and what one in space leaves out."""
+"""Fields that exist only in space, and those that only a plane scene has."""
 
 from __future__ import annotations
 

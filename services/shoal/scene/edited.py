@@ -14,10 +14,10 @@ _Loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
 def edited(text: str, changes: Mapping[Keys, str]) -> str:
-    """The text with other words at some places, each a text now.
+    """Return a YAML text with other values at some places, and the rest as it is.
 
-    text: one that `load.read_yaml` took, which bounds its size and depth. Where a value cannot be told apart from the
-    rest of the text, as that of an alias, the whole is written anew.
+    text: accepted by `load.read_yaml`, which bounds its size and depth. Where a value has no place of its own in the
+    text, as an alias, the whole is written again.
     """
     root, wanted, found = yaml.compose(text, _Loader), _data(text), text
     places = [(_node(root, keys), word) for keys, word in changes.items()]
@@ -51,6 +51,6 @@ def _node(node: Any, keys: Keys) -> Any:
 
 
 def _scalar(word: str) -> str:
-    """As it may stand anywhere, also between brackets."""
+    """Return a scalar as it may stand anywhere, also between brackets."""
     plain = word.translate({ord(mark): None for mark in "/._-"})
     return word if plain.isalnum() and plain.isascii() else "'" + word.replace("'", "''") + "'"

@@ -21,7 +21,7 @@ CURVES = ("ancf-cable", "ancf-quintic")
 
 
 class BodyState(Record):
-    """Where a body is and how it moves.
+    """State of a body.
 
     vectors: of a rigid body its origin [m] and its directors (of a point mass the origin alone), of a flexible rod
     those of its nodes (place [m], slope, ...), one node after the other, of a modal body its origin, its director and a
@@ -58,7 +58,7 @@ class End(Record):
 
 
 def _differences(state: BodyState, body: Any) -> Iterator[tuple[str, Any, Any]]:
-    """What is not as it was in the run: the field, its value there and here."""
+    """Yield the fields that differ from the run: the field, its value there and here."""
     if state.element != body.element:
         yield "element", state.element, body.element
     mesh = mesh_of(body)
@@ -76,12 +76,12 @@ def _differences(state: BodyState, body: Any) -> Iterator[tuple[str, Any, Any]]:
 
 
 def mesh_of(body: Any) -> dict[str, int]:
-    """How finely a body is divided; empty for all but flexible rods."""
+    """Return the mesh of a body; empty for all but flexible rods."""
     return dict(getattr(body, "mesh", {}))
 
 
 def read_end(path: Path) -> Any:
-    """What the JSON of a run (`shoal simulate --json`, `--out FILE.json`) tells of its end. Raises InputError."""
+    """Read the final state from the JSON of a run (`shoal simulate --json`, `--out FILE.json`). Raises InputError."""
     require_regular(path, "initial.from")
     try:
         with path.open("rb") as file:

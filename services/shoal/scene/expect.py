@@ -1,4 +1,4 @@
-"""What a scene of the library is expected to do, night after night: a value, a recording, another engine, as before."""
+"""Expectations of a scene of the library, checked nightly: a value, a recording, another engine, its earlier result."""
 
 from __future__ import annotations
 

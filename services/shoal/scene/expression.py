@@ -64,7 +64,7 @@ def evaluate(text: str, values: Mapping[str, float]) -> float:
 
 
 def evaluate_array(text: str, values: Mapping[str, Number]) -> Number:
-    """As `evaluate`, entry by entry for arrays that broadcast; precision is that of the arrays."""
+    """Evaluate an expression entry by entry for arrays that broadcast, in the precision of the arrays."""
     with np.errstate(all="ignore"):
         value = np.asarray(_value(parse(text).body, {**_CONSTANTS, **values}))
     return np.where(np.isfinite(value), value, np.nan)
@@ -85,7 +85,7 @@ def parse(text: str) -> ast.Expression:
 
 
 def _check(tree: ast.Expression, text: str) -> None:
-    """Refuse whatever is not arithmetic, level by level, so that what is left is shallow enough to recurse into."""
+    """Refuse all but arithmetic, level by level, so that the rest is shallow enough for recursion."""
     level: list[ast.AST] = [tree]
     for _ in range(_DEEPEST):
         inner: list[ast.AST] = []

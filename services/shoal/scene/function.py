@@ -185,7 +185,7 @@ class Composed:
 
     @property
     def formula(self) -> formula.Node | None:
-        """As of `Function`."""
+        """See `Function`."""
         node = self.function.formula
         for operation in self.operations if node is not None else ():
             node = formula.make(operation, node)
@@ -193,11 +193,11 @@ class Composed:
 
     @property
     def knots(self) -> tuple[float, ...]:
-        """As of `Function`."""
+        """See `Function`."""
         return self.function.knots
 
     def __call__(self, t: Array) -> Array:
-        """As of `Function`."""
+        """See `Function`."""
         value = self.function(t)
         for operation in self.operations:
             value = formula.OPERATIONS[operation](value)

@@ -1,4 +1,4 @@
-"""How a machine starts: what is stated of each body, where that is only a guess, and the end of another run."""
+"""Initial state: stated quantities of each body, guesses among them, and the final state of another run."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ ABOUT_Z: dict[Quantity, Quantity] = {"angle": "rotation", "rate": "spin"}
 class InitialState(Record):
     """Absolute angle [rad], counter-clockwise from +X, and rate [rad/s] of a body at time zero.
 
-    position [m] and velocity [m/s] are those of its frame's origin. What is None is not stated: it follows from what
-    is, and is zero where nothing tells it. rotation, spin: in space, a rotation vector [rad] in place of the angle and
-    an angular velocity [rad/s] along the axes of the ground in place of the rate. modes, mode_rates: of a body that
+    position [m] and velocity [m/s] are those of its frame's origin. None: not stated; it follows from the joints
+    and the stated quantities, else it is zero. rotation, spin: in space, a rotation vector [rad] in place of the angle
+    and an angular velocity [rad/s] along the axes of the ground in place of the rate. modes, mode_rates: of a body that
     bends by modes, their amplitudes and rates, all or none. guess: the quantities that may change
     where the joints demand it.
     """

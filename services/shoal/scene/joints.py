@@ -255,7 +255,7 @@ class Gear(Tie):
 
     @property
     def axes(self) -> tuple[Vector3, Vector3]:
-        """That of the first body, and that of the second."""
+        """Return the axis on the first body, and on the second."""
         return self.axis, self.second_axis or self.axis
 
     @model_validator(mode="after")

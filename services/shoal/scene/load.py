@@ -134,7 +134,7 @@ def read_named(name: str, folder: Traversable, what: str, known: list[str]) -> A
 
 
 def unknown(name: str, what: str, known: list[str]) -> str:
-    """That there is no such thing, and which names are like it."""
+    """Return the message for an unknown name, with similar names."""
     name = name if len(name) <= 80 else name[:77] + "..."
     near = list(dict.fromkeys(get_close_matches(name, known, 3) + [one for one in known if name and name in one][:3]))
     return f"{name}: no such {what}" + (f" (did you mean {' or '.join(near)}?)" if near else "")
@@ -171,7 +171,7 @@ def scene_library() -> Traversable:
 
 
 def scene_names() -> list[str]:
-    """Names of the built-in scenes, of parametric ones the examples, then those of one's own library, sorted each."""
+    """Return the names of built-in scenes (of parametric ones the examples), then of the user library, each sorted."""
     return [*built_in_scenes(), *(entry.name for entry in shelf().entries("scenes"))]
 
 
@@ -195,7 +195,7 @@ def as_scene(given: Scene | Mapping[str, Any] | str | Path) -> Scene:
 
 
 def load_scene(name: str | Path) -> Scene:
-    """The scene of that name, built-in or of one's own library, or in that YAML file as it is now. Raises InputError.
+    """Load a scene by its name, built-in or in the user library, or from a YAML file. Raises InputError.
 
     NAME@VERSION is an earlier version of the library's.
     """

@@ -12,7 +12,7 @@ from shoal.scene.record import Axis, NonNegative, Record, Vector, kinds
 
 
 class Elastic(Record):
-    """What springs have: a polynomial law and a damper between two places."""
+    """Base of springs: a polynomial law and a damper between two places."""
 
     kind: str
     first: Attachment

@@ -33,8 +33,8 @@ class Signal(Record):
     path: from the folder of the scene's file. time, column: their names; time_scale: seconds in a unit of the time,
     scale: SI units in a unit of the column. start: the time of the table [s] at which the motion begins. Rows with a
     gap are left out.
-    smooth, noise: as of `Function`; what is drawn smoothly, and states its noise in SI units, is freed of it first, as
-    far as its samples tell noise from motion
+    smooth, noise: as of `Function`; where `smooth` is set and the noise is stated in SI units, the samples are
+    smoothed first as far as they separate noise from motion
     """
 
     path: str
@@ -63,7 +63,7 @@ class Signal(Record):
         return {"smooth": self.smooth, **self._without_noise(rows)}
 
     def _without_noise(self, rows: np.ndarray) -> dict[str, Any]:
-        """Rows [t, value] as the table of a function, without noise that is stated: nobody's numbers change unasked."""
+        """Return rows [t, value] as the table of a function, smoothed where the noise is stated, else unchanged."""
         if not self.smooth or not self.noise or np.any(np.diff(rows[:, 0]) <= 0.0):
             return {"table": rows.tolist(), "noise": self.noise}
         strength, _ = strength_of(rows[:, 0], rows[:, 1])
@@ -72,9 +72,9 @@ class Signal(Record):
         return {"table": rows.tolist(), "noise": self.noise, "smoothing": strength}
 
     def _check_start(self, times: np.ndarray) -> None:
-        """Refuse a motion of which the table tells nothing: times [s] of the motion.
+        """Refuse a motion that the table does not cover; times [s] of the motion.
 
-        It begins at the table's end, or more than the table's length before it and nobody said so.
+        It begins at the table's end, or more than the table's length before it without a stated start.
         """
         if len(times) < 2 or np.any(np.diff(times) <= 0.0):  # refused by the table itself
             return
@@ -86,7 +86,7 @@ class Signal(Record):
             )
 
     def _factor(self, field: str, column: str, units: Units | None, measure: tuple[str, Mapping[str, float]]) -> float:
-        """What is stated, or else what the table says of a column; measure: what it is, and the units of that."""
+        """Return the stated factor, else that of the unit in the table; measure: the quantity and its units."""
         what, known = measure
         unit = units.of.get(column, "") if units else ""
         if field in self.model_fields_set or units is None or not unit:
@@ -111,7 +111,7 @@ def with_signals(data: Any, folder: Path, source: str) -> Any:
 
 
 def signals(data: Any) -> Iterator[tuple[tuple[str, str, str], dict[str, Any], dict[str, Any]]]:
-    """Where signals stand in the fields of a scene: the path, the mapping that holds the field, and the field."""
+    """Yield the signals in the fields of a scene: the path, the mapping that holds the field, and the field."""
     for part in PARTS:
         members = data.get(part) if isinstance(data, dict) else None
         for name, member in members.items() if isinstance(members, dict) else ():

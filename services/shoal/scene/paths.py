@@ -91,7 +91,7 @@ def key(place: Any, part: str, path: str, parent: str) -> Any:
 
 
 def unknown(path: str, parent: str, place: Any) -> InputError:
-    """What to say of a path that leads nowhere."""
+    """Return the error for a path that does not exist."""
     if place is None and parent.startswith("initial.") and parent.endswith((".position", *_VECTORS)):
         whole = ", such as [0, 0, 0]" if parent.endswith(_VECTORS) else ""
         return InputError(f"{path}: {parent} is not stated, so it has no component to set; state it whole{whole}")

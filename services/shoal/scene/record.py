@@ -33,7 +33,7 @@ _MAY_HOLD_TRUTH = (bool, dict, list, tuple)
 
 
 class Base(BaseModel):
-    """What is read from elsewhere: true and false (in YAML also yes, no, on, off) are refused in place of a number."""
+    """Base of input models: true and false (in YAML also yes, no, on, off) are refused in place of a number."""
 
     @model_validator(mode="before")
     @classmethod
@@ -54,7 +54,7 @@ def _numbers(model: type[BaseModel]) -> frozenset[str]:
 
 
 def _scalars(annotation: Any) -> Iterator[Any]:
-    """What a type is made of in the end."""
+    """Yield the scalar types that a type is made of."""
     if parts := get_args(annotation):
         for part in parts:
             yield from _scalars(part)
@@ -188,7 +188,7 @@ def _there_are(path: tuple[int | str, ...], model: type[Record] | None) -> str:
 
 
 def _path(error: Any, model: type[Record] | None) -> str:
-    """Where an error is, as a user writes it; of a list that is too short the list itself."""
+    """Return the path of an error as a user writes it; of a list that is too short the list itself."""
     parts = [str(part) for part in error["loc"][: -1 if _lacks(error) else None]]
     field = model.model_fields.get(parts[0]) if model and parts[2:] else None
     # Pydantic puts the kind that tells the members of a field apart into the path, after the member's name.

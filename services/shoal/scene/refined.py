@@ -10,7 +10,7 @@ from shoal.scene.scene import Scene
 
 
 def refined(scene: Scene, times: int) -> dict[str, Any]:
-    """The fields that give every flexible rod so many times as many elements or modes, by their paths.
+    """Return the fields that multiply the elements or modes of every flexible rod, by their paths.
 
     New modes start at rest and undeformed.
     """

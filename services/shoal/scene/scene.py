@@ -196,7 +196,7 @@ class Scene(Record):
                     )
 
     def _placed(self) -> set[str]:
-        """Bodies whose start the joints tell, from the ground or from a body that says its position."""
+        """Return the bodies whose position follows from joints to the ground or to a body with a stated position."""
         joined: dict[str, set[str]] = {}
         for joint in self.joints.values():
             first, *others = (side.body for side in joint_types.places(joint))
@@ -373,9 +373,9 @@ class Scene(Record):
         return self
 
     def statements(self, varied: Iterable[str] = ()) -> tuple[tuple[str, Quantity], ...]:
-        """Body and quantity of what is stated of the start and was not stated as a guess.
+        """Return body and quantity of the values of the start that are stated and are no guesses.
 
-        Values that are guesses only because others were set after them are statements. varied: paths of values that
+        Values that are guesses only because others were set after them count as stated. varied: paths of values that
         lanes will state.
         """
         split = [path.split(".") for path in varied]
@@ -410,7 +410,7 @@ class Scene(Record):
 
 
 def _counted(one: str, many: str, names: Mapping[str, Any]) -> str:
-    """How many there are, and their names where they are few; empty for none."""
+    """Return the number of things, with their names if they are few; empty for none."""
     if not names:
         return ""
     listed = f" {', '.join(names)}" if len(names) <= _FEW else ""

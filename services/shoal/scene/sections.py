@@ -18,7 +18,7 @@ _TERMS = np.arange(1, 400, 2)
 
 @dataclass(frozen=True)
 class Section(ABC):
-    """A section with its extent [m]. needs: the fields of a rod that tell it, besides the height."""
+    """A section with its extent [m]. needs: the fields of a rod that define it, besides the height."""
 
     height: Number
     width: Number
@@ -30,7 +30,7 @@ class Section(ABC):
         return cls(height, width)
 
     def fault(self) -> str:
-        """What is impossible about it, if anything is."""
+        """Return why the section is impossible; empty if it is not."""
         return ""
 
     @property
@@ -208,7 +208,7 @@ class IBeam(Section):
 
     @property
     def torsion(self) -> Number:
-        """Of its strips, each a third of length times thickness cubed, along their middle lines."""
+        """Return the torsion constant: of each strip a third of length times thickness cubed, along its middle line."""
         return (2 * self.width * self.flange**3 + (self.height - self.flange) * self.web**3) / 3
 
     def shear(self, poisson: Number) -> Number:

@@ -24,7 +24,7 @@ IntegratorName = Literal[
 
 
 class Solver(Record):
-    """How the motion is computed.
+    """Settings of the integrator and of the checks of a run.
 
     `duration` and `step` are in s; the motion is reported at its start and at `samples` evenly spread times
     after it. `integrator: auto` picks by the stiffness of the scene.
@@ -33,9 +33,9 @@ class Solver(Record):
     longest (no limit if null: a machine at rest may then skip what a drive does later), and `max_steps` the most
     they may take. `spectral_radius` is rho_infinity of generalized-alpha. `acceleration` is how Gauss's principle
     is solved, `baumgarte` [1/s] the rate of Baumgarte's stabilisation, `project` whether drift is removed after
-    every step, `rank_tolerance` how far from a singular position counts as singular. `inertia_cap` lets leapfrog, and
-    no other, take steps that axial vibrations are too fast for: their inertia is raised to suit. `theory` is what a
-    tolerance is about: of slender rods, or (auto) of rods with shear and rotary inertia where these count.
+    every step, `rank_tolerance` the distance from a singular position that counts as singular. `inertia_cap` (leapfrog
+    only) raises the inertia of axial vibrations that are too fast for the step. `theory` is the one that a tolerance
+    refers to: of slender rods, or (auto) of rods with shear and rotary inertia where these count.
     `energy_tolerance` is the relative energy error beyond which a run is rejected. The accelerations `afsa`, `iafsa`
     and `iafsa-printed` let `swarm_size` fish search for `swarm_iterations` iterations in every time step (the paper's
     section 4.2, with its numbers); `swarm_seed` makes them repeatable.

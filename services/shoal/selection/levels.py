@@ -1,4 +1,4 @@
-"""How richly one rod may be modelled: a ladder from rigid to ever more elements.
+"""Hierarchy of models of one rod, from rigid to ever more elements.
 
 The accuracy of n quintic elements needs about 2 n cubic cables of reduced quadrature, whose work is about the same for
 small n and more beyond. So cables are the coarse end of the elements and quintic ones the fine end. A few modes in a
@@ -23,7 +23,7 @@ _SHORT = {"ancf-cable": "cable", "ancf-quintic": "quintic", "ancf-full": "full",
 
 @dataclass(frozen=True)
 class Level:
-    """One rung for one rod: its element and how many of them, or of modes where it bends by modes.
+    """A model of one rod: its element and the number of elements, or of modes where it bends by modes.
 
     rotary: whether the sections of a rigid or modal rod have rotary inertia
     """
@@ -34,7 +34,7 @@ class Level:
     modes: int = 0
 
     def fields(self, rod: Rod) -> dict[str, Any]:
-        """The fields that make a rod so, whatever it was before."""
+        """Return the fields that give a rod this model."""
         values: dict[str, Any] = {"element": self.element}
         if self.element != "rigid" or rod.element == "modal":
             values |= rod.by_elements(self.element, self.elements)
@@ -49,11 +49,11 @@ class Level:
 
 
 Levels = Mapping[str, Level]
-"""Of every rod whose model is open; the other bodies stay as the scene states them."""
+"""Levels of the rods whose model is open; the other bodies stay as the scene states them."""
 
 
 def words(levels: Levels) -> str:
-    """Such as `upper 1, lower 2 quintic, third rigid`: rods of one element together."""
+    """Describe levels, such as `upper 1, lower 2 quintic, third rigid`: rods of one element together."""
     rods: dict[str, list[str]] = {}
     for rod, level in levels.items():
         counted = rod if level.element == "rigid" else f"{rod} {level.modes or level.elements}"
@@ -66,17 +66,17 @@ STOUT = Level("rigid", rotary=True)
 
 
 def cable(n: int) -> Level:
-    """n cubic cables."""
+    """Return the level of n cubic cable elements."""
     return Level("ancf-cable", n)
 
 
 def quintic(n: int) -> Level:
-    """n quintic elements."""
+    """Return the level of n quintic elements."""
     return Level("ancf-quintic", n)
 
 
 def modal(n: int, rotary: bool = False) -> Level:
-    """n modes of bending in a floating frame."""
+    """Return the level of n bending modes in a floating frame."""
     return Level("modal", rotary=rotary, modes=n)
 
 
@@ -94,24 +94,24 @@ LADDERS = {
     SHEARS: (STOUT, *(modal(n, rotary=True) for n in MODES), *(Level(SHEARS, n) for n in COUNTS)),
     "director-rod": (RIGID, *(Level("director-rod", n) for n in COUNTS)),
 }
-"""From coarse to fine, by the element whose limit is the truth."""
+"""Levels from coarse to fine, by the element whose limit is the truth."""
 
 FEWEST = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32)
-"""Numbers with which refinements may begin; all that follow by doubling are among COUNTS."""
+"""First numbers of elements of refinements; all that follow by doubling are among COUNTS."""
 REFINEMENTS = (1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024, 2048)
 """Numbers of these elements in the models by which errors are estimated."""
 WOUND = 256
-"""Elements with which the ladder of a wound rod may begin."""
+"""Largest first number of elements of a wound rod."""
 
 
 def below(level: Level, limit: str, coarsest: Level) -> tuple[Level, ...]:
-    """Coarser levels down to the coarsest, the finest first, of a rod whose truth is the limit of that element."""
+    """Return the coarser levels, the finest first, of a rod whose truth is the limit of that element."""
     ladder = LADDERS[limit]
     return tuple(reversed(ladder[ladder.index(coarsest) : ladder.index(level)]))
 
 
 def open_rods(scene: Scene) -> dict[str, str]:
-    """The rods whose model is open, and the element whose limit is their truth: of the scene's theory the finest.
+    """Return the rods whose model is open, and the element whose limit is their truth: the finest of its theory.
 
     Bernoulli-Euler's beam, unless the scene names simo-reissner or ancf-full, which have shear, or director-rod, which
     twists. A rigid rod that leaves the plane may twist. Raises InputError for an element that is on no ladder.
@@ -134,10 +134,10 @@ def open_rods(scene: Scene) -> dict[str, str]:
 
 
 def coarsest(scene: Scene, limits: Mapping[str, str], meshed: Collection[str] = ()) -> dict[str, Level]:
-    """Where the ladders of rods begin. limits: the element whose limit is the truth of each; meshed: see `select`.
+    """Return the coarsest levels of rods. limits: the element whose limit is the truth of each; meshed: see `select`.
 
-    The others are rigid, but for director rods that are curved or twisted: of those no element turns by more than a
-    right angle or so. Raises InputError where that takes too many of them.
+    They are rigid, except for curved or twisted director rods, whose elements turn by a right angle at most.
+    Raises InputError where that takes too many elements.
     """
     return {rod: _coarsest(rod, scene.bodies[rod], limit, rod in meshed) for rod, limit in limits.items()}
 
@@ -155,12 +155,12 @@ def _coarsest(name: str, rod: Any, limit: str, meshed: bool) -> Level:
 
 
 def apply(scene: Scene, levels: Levels) -> Scene:
-    """The scene with its rods modelled so. Raises InputError where a joint does not suit a flexible rod."""
+    """Return the scene with these levels. Raises InputError where a joint does not suit a flexible rod."""
     return scene.with_values(fields(scene, levels))
 
 
 def fields(scene: Scene, levels: Levels) -> dict[str, Any]:
-    """The values of a scene by which its rods are modelled so."""
+    """Return the values of a scene that give its rods these levels."""
     rods = {name: scene.bodies[name] for name in levels}
     return {
         f"bodies.{name}.{field}": value

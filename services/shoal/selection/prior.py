@@ -1,9 +1,9 @@
-"""What rigid rods leave out, estimated before anything flexible is run: quasi-static deflection, amplified.
+"""A priori estimate of the error of rigid rods: quasi-static deflection, amplified by the sensitivity of the motion.
 
-The machine moves with rigid rods. Along the way each rod bears its weight less its inertia and the loads on it, and
-would bend and stretch by the deflection of a beam under them. Released at once, an elastic rod swings to twice its
-deflection; the motion carries that on with the factor by which it carries on small changes of the initial angles.
-This is an order of magnitude. It prunes only where it is far from the tolerance.
+The machine moves with rigid rods. On the way each rod carries its weight less its inertia and the loads on it, and
+would bend and stretch as a beam under them. Released at once, an elastic rod swings to twice its deflection; the motion
+amplifies that by the factor by which it amplifies small changes of the initial angles. This is an order of magnitude:
+it excludes models only where it is far from the tolerance.
 """
 
 from __future__ import annotations
@@ -41,11 +41,11 @@ NUDGE = 1e-4
 
 @dataclass(frozen=True)
 class Prior:
-    """What is known of a rod a priori.
+    """A priori estimates for a rod.
 
-    deflection: quasi-static, largest along the motion [m], nan if the loads cannot be told beforehand
-    growth: by which factor the motion carries small changes on
-    error: what modelling the rod as rigid costs at the markers, by order of magnitude [m]
+    deflection: quasi-static, largest along the motion [m], nan if the loads are not known beforehand
+    growth: factor by which the motion amplifies small changes
+    error: of modelling the rod as rigid, at the markers, by order of magnitude [m]
     frequency: lowest bending frequency of the rod, pinned at both ends, about its weaker axis [rad/s]
     """
 

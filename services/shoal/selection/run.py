@@ -1,4 +1,4 @@
-"""One rung: a model of the scene, run once, with the time step or tolerance that goes with it."""
+"""One candidate: a model of the scene, run once, with the time step or tolerance that goes with it."""
 
 from __future__ import annotations
 
@@ -19,10 +19,11 @@ CLOSE = 1e-8
 
 
 @dataclass
-class Rung:
+class Candidate:
     """A model that was run.
 
-    error: estimated distance from the truth at the markers [m], nan if unknown; torn: see `beyond.torn`, of yardsticks
+    error: estimated distance from the truth at the markers [m], nan if unknown
+    excess: of references, see `excessive_strain`
     """
 
     levels: dict[str, Level]
@@ -32,7 +33,7 @@ class Rung:
     error: float = np.nan
     role: str = ""
     tolerance: float = field(default=np.nan)
-    torn: str = ""
+    excess: str = ""
 
     @property
     def ok(self) -> bool:

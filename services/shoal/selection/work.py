@@ -1,4 +1,4 @@
-"""What a model costs before it is run: its stable step, and its work in steps of one cable element.
+"""Forecast of the cost of a model: its stable step, and its work in steps of one cable element.
 
 The highest frequency of a machine is about the highest of its rods, each taken with the others as coarse as can be. It
 is computed on two elements and carried over to n: an axial mode goes as c / l, a bending mode as c r / l^2 (c^2 = E /

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 from rich.progress import track
-from shoal.selection.climb import PATIENCE
+from shoal.selection.refine import PATIENCE
 from shoal.trajectory import plain
 
 from shoal_validation.document import rewrite

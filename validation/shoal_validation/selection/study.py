@@ -8,9 +8,9 @@ from itertools import product
 
 import numpy as np
 from shoal.selection import Selection, select
-from shoal.selection.climb import PATIENCE, Runs
 from shoal.selection.levels import LADDERS, Level
-from shoal.selection.run import Rung, distance
+from shoal.selection.refine import PATIENCE, Runs
+from shoal.selection.run import Candidate, distance
 
 from shoal_validation.benchmarks.timing import undisturbed
 from shoal_validation.selection.machines import Draw
@@ -28,7 +28,7 @@ class Case:
     """What one machine showed.
 
     stiffness: geometric mean of the rods' moduli [Pa]; rigid: whether all rods came out rigid;
-    error: true distance from the yardstick of the finer selection [m], nan if there is none; work: of the chosen model;
+    error: true distance from the reference of the finer selection [m], nan if there is none; work: of the chosen model;
     uncapped: the least work of those tried models within the tolerance whose inertia is not capped; least: of all such
     models, nan if not searched for; seconds: of the selection, less what it waited for others on the machine
     """
@@ -59,14 +59,14 @@ class Case:
 def study(machine: Draw, exhaustive: bool = False, patience: float = PATIENCE) -> Case:
     """Select, then judge by a finer selection. patience: see `select` [s]."""
     seconds, chosen = undisturbed(lambda: select(machine.scene, machine.tolerance, patience=patience))
-    finer = select(machine.scene, machine.tolerance / FINER, patience=JUDGE, trimmed=False)
+    finer = select(machine.scene, machine.tolerance / FINER, patience=JUDGE, coarsened=False)
     # A finer selection that is not met may have stayed with another theory, by which nothing is judged.
     limits = finer.limits if finer.met else chosen.limits
-    yardstick = min(
-        (r for r in finer.rungs if np.isfinite(r.error) and _of(r, limits)), key=lambda r: r.error, default=None
+    reference = min(
+        (r for r in finer.candidates if np.isfinite(r.error) and _of(r, limits)), key=lambda r: r.error, default=None
     )
-    error = distance(chosen.chosen.trajectory, yardstick.trajectory) if yardstick is not None else np.nan
-    least, cheapest = (np.nan, "") if not exhaustive or yardstick is None else _cheapest(machine, chosen, yardstick)
+    error = distance(chosen.chosen.trajectory, reference.trajectory) if reference is not None else np.nan
+    least, cheapest = (np.nan, "") if not exhaustive or reference is None else _cheapest(machine, chosen, reference)
     return Case(
         machine.seed,
         len(machine.scene.bodies),
@@ -78,7 +78,7 @@ def study(machine: Draw, exhaustive: bool = False, patience: float = PATIENCE) -
         all(level.element == "rigid" for level in chosen.chosen.levels.values()),
         chosen.chosen.error,
         error,
-        yardstick.error if yardstick is not None else np.nan,
+        reference.error if reference is not None else np.nan,
         chosen.chosen.work,
         _uncapped(chosen),
         least,
@@ -87,15 +87,17 @@ def study(machine: Draw, exhaustive: bool = False, patience: float = PATIENCE) -
     )
 
 
-def _of(rung: Rung, limits: Mapping[str, str]) -> bool:
+def _of(candidate: Candidate, limits: Mapping[str, str]) -> bool:
     """Return whether a model belongs to the theory whose limits are the truth."""
-    return all(level in LADDERS[limits[rod]] for rod, level in rung.levels.items())
+    return all(level in LADDERS[limits[rod]] for rod, level in candidate.levels.items())
 
 
 def _uncapped(chosen: Selection) -> float:
-    mine = (rung for rung in chosen.rungs if _of(rung, chosen.limits))
-    plain = [rung for rung in mine if rung.ok and not rung.scene.solver.inertia_cap]
-    return min((rung.work for rung in plain if rung.error <= chosen.tolerance), default=chosen.chosen.work)
+    mine = (candidate for candidate in chosen.candidates if _of(candidate, chosen.limits))
+    plain = [candidate for candidate in mine if candidate.ok and not candidate.scene.solver.inertia_cap]
+    return min(
+        (candidate.work for candidate in plain if candidate.error <= chosen.tolerance), default=chosen.chosen.work
+    )
 
 
 def _stiffness(machine: Draw) -> float:
@@ -103,10 +105,10 @@ def _stiffness(machine: Draw) -> float:
     return float(np.exp(np.mean([np.log(modulus) for modulus in moduli if modulus])))
 
 
-def _cheapest(machine: Draw, chosen: Selection, yardstick: Rung) -> tuple[float, str]:
+def _cheapest(machine: Draw, chosen: Selection, reference: Candidate) -> tuple[float, str]:
     """The least work within the tolerance among all combinations of levels, without capped inertia."""
     rods, least = tuple(chosen.chosen.levels), _uncapped(chosen)
-    runs = Runs(chosen.chosen.scene, yardstick.trajectory.times, chosen.limits, lambda _: None)
+    runs = Runs(chosen.chosen.scene, reference.trajectory.times, chosen.limits, lambda _: None)
     cheaper: list[tuple[float, dict[str, Level]]] = []
     ladders = ([level for level in LADDERS[chosen.limits[rod]] if runs.knows(rod, level)] for rod in rods)
     for levels in product(*ladders):
@@ -117,6 +119,6 @@ def _cheapest(machine: Draw, chosen: Selection, yardstick: Rung) -> tuple[float,
     if sum(work for work, _ in cheaper) > AFFORDABLE:
         return np.nan, ""
     for work, combination in sorted(cheaper, key=lambda pair: pair[0]):
-        if distance(runs(combination).trajectory, yardstick.trajectory) <= machine.tolerance:
-            return work, runs.rungs[-1].name
+        if distance(runs(combination).trajectory, reference.trajectory) <= machine.tolerance:
+            return work, runs.candidates[-1].name
     return least, ""

@@ -54,9 +54,8 @@ def trajectory_table(trajectory: Trajectory, scene: Scene, selection: Selection 
 def selection_table(selection: Selection) -> None:
     """The ladder: what was tried, at what cost, how far off, and why it stopped."""
     chosen = selection.chosen
-    title = (
-        f"models for {selection.tolerance:g} m at the markers: {len(selection.rungs)} runs, {selection.wall_s:.2f} s"
-    )
+    runs = f"{len(selection.candidates)} runs, {selection.wall_s:.2f} s"
+    title = f"models for {selection.tolerance:g} m at the markers: {runs}"
     table = screen.table(title, "model", "unknowns", "steps", "ms", "error [m]", "")
     table.columns[-1].no_wrap = True
     for row in rows(selection):

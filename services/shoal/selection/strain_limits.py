@@ -1,4 +1,4 @@
-"""Where no theory of rods holds: torques and motions under which sections fold over one another."""
+"""Limits of all rod theories: torques and motions that strain a section beyond 100 %, so that sections overlap."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from shoal.scene.loads import Load
 from shoal.trajectory import Array
 
 BEYOND = 1.0
-"""Strain of bending at the surface of a rod beyond which its pressed fibres have no length left; and of shear."""
+"""Strain of bending at the surface of a rod at which its compressed fibres have no length left; and of shear."""
 
 
-def folded(scene: Scene, rods: Collection[str]) -> str:
-    """Which torques fold the end of a rod that moves in the plane, or nothing.
+def excessive_torques(scene: Scene, rods: Collection[str]) -> str:
+    """Return which torques fold the end of a rod that moves in the plane, or nothing.
 
-    The end that torques M hold alone bends at the curvature M/(E I), the strain at its surface is M h/(2 E I). Nothing
-    is said of an end where a joint, a torsion spring or a torque that changes with time acts.
+    Where only torques M act on an end, its curvature is M/(E I) and the strain at its surface M h/(2 E I). Ends with a
+    joint, a torsion spring or a torque that changes with time are not examined.
     """
     if scene.dimensions == 3:
         return ""
@@ -46,7 +46,7 @@ def folded(scene: Scene, rods: Collection[str]) -> str:
 
 
 def _alone(scene: Scene, body: str, end: str) -> list[str]:
-    """The constant torques at an end of a rod where nothing else holds its direction."""
+    """Return the constant torques at an end of a rod where nothing else holds its direction."""
     place = (body, end)
     if any(place == (side.body, side.point) for joint in scene.joints.values() for side in places(joint)):
         return []
@@ -62,18 +62,20 @@ def _alone(scene: Scene, body: str, end: str) -> list[str]:
 
 
 def _at(load: Load, body: str, end: str) -> float:
-    """The moment of a constant torque on an end of a rod [N m]."""
+    """Return the moment of a constant torque on an end of a rod [N m]."""
     assert isinstance(load, Torque)
     assert load.torque.number is not None
     here = [(load.at, 1.0), (load.reaction, -1.0)]
     return load.torque.number * sum(sign for side, sign in here if side and (side.body, side.point) == (body, end))
 
 
-def torn(scene: Scene, states: States, times: Array, believed: Callable[[float], bool] = lambda _: True) -> str:
-    """Which rod with shear a motion strains too much, and when first, or nothing.
+def excessive_strain(
+    scene: Scene, states: States, times: Array, believed: Callable[[float], bool] = lambda _: True
+) -> str:
+    """Return which rod with shear a motion strains too much, and when first, or nothing.
 
-    By the strain of bending at the surface of an element and by the shear at its nodes; curved rods are not looked at.
-    times: of the states [s], (samples,); believed: whether the motion may be believed up to a time [s]
+    Examined are the strain of bending at the surface of each element and the shear at its nodes, not of curved rods.
+    times: of the states [s], (samples,); believed: whether the motion is accepted up to a time [s]
     """
     worst: tuple[float, str, str] | None = None
     for name, frame in states.model.frames.items():
@@ -91,7 +93,7 @@ def torn(scene: Scene, states: States, times: Array, believed: Callable[[float],
 
 
 def _strains(frame: BeamFrame, q: Array, rod: Rod) -> Mapping[str, Array]:
-    """The largest along a rod, (samples,) each; q: (samples, unknowns)."""
+    """Return the largest strains along a rod, (samples,) each; q: (samples, unknowns)."""
     slopes, normals = (
         np.stack([_along(node[k], q) for node in frame.nodes], axis=1) for k in (1, 2)
     )  # (samples, nodes, 2) each
@@ -106,6 +108,6 @@ def _strains(frame: BeamFrame, q: Array, rod: Rod) -> Mapping[str, Array]:
 
 
 def _along(vector: Affine, q: Array) -> Array:
-    """A vector along a motion, (samples, d)."""
+    """Return a vector along a motion, (samples, d)."""
     parts = (np.outer(q[:, unknown], coefficient[:, 0]) for unknown, coefficient in vector.terms.items())
     return sum(parts, np.tile(vector.constant[:, 0], (len(q), 1)))

@@ -1,4 +1,4 @@
-"""Down again: the cheapest model that still agrees with the yardstick."""
+"""Adaptive model selection, second part: coarsen the rods to the cheapest model that agrees with the reference."""
 
 from __future__ import annotations
 
@@ -11,38 +11,38 @@ from shoal.errors import InputError
 from shoal.mechanics.numerics.alike import FEW
 from shoal.mechanics.simulate import STEP_MARGIN
 from shoal.scene import FRAMED
-from shoal.selection.climb import PACE, TELL, Runs, Yardstick
 from shoal.selection.levels import LADDERS, Level, Levels, below
-from shoal.selection.run import Rung, distance
+from shoal.selection.refine import PACE, TELL, Reference, Runs
+from shoal.selection.run import Candidate, distance
 
 WITHIN = 0.9
 """A model meets the tolerance if its estimated error is within this fraction of it."""
 CHEAPER = 0.95
 """A coarser level is tried only if the rod's foreseen work is below this fraction of the last that was tried."""
 HARMLESS = 0.1
-"""While one rod goes down, those before it stay at the cheapest level that costs this part of the tolerance at most."""
+"""While a rod is coarsened, the others have the cheapest level with at most this part of the tolerance as error."""
 MISSES = 2
-"""So many levels in a row beyond twice the tolerance end the way down the elements."""
+"""Levels in a row with an error beyond twice the tolerance that end the coarsening of a rod."""
 GAINS = 2.0
-"""Twice as many modes that gain less end the way up."""
+"""Doubling the modes ends where it gains less than this factor."""
 HOPEFUL = 1.6
 """Errors of rods may cancel: combinations are tried up to this multiple of the tolerance."""
 TRIES = 10
-"""Combinations that are run before the climb's own model is taken."""
+"""Combinations that are run before the reference itself is taken."""
 STRIDES = (3.0, 2.0, 1.4)
 """Longer steps, in stable ones, that are tried with capped inertia."""
 SHARE, SEARCH = 1.0, TELL * PACE
-"""A way down may take so much of the climb's work, and so much in any case."""
+"""Work that a coarsening may take: this share of that of the refinement, and this much in any case."""
 VECTORS = {"rigid": 0, "ancf-cable": 2, "ancf-quintic": 3}
 """Nodal vectors that an element adds, of those whose inertia can be capped."""
 
 
-def trim(runs: Runs, yardstick: Yardstick, rods: tuple[str, ...], tolerance: float) -> Rung | None:
-    """The cheapest rung found within the tolerance; None if none is.
+def coarsen(runs: Runs, reference: Reference, rods: tuple[str, ...], tolerance: float) -> Candidate | None:
+    """Return the cheapest candidate within the tolerance; None if none is.
 
-    A rod in a frame costs more than a few elements, unless it lets the machine take longer steps: so the rods whose
-    elements limit the step most go into frames, together. Each way down, from some of them or none, the one that
-    promises most first, takes no more work than the climb did, or about five seconds.
+    A rod in a floating frame costs more than a few elements, unless it lets the machine take longer steps: so the rods
+    whose elements limit the step most get frames, together. Each coarsening starts with some of them or none, the one
+    with the least forecast work first, and takes no more work than the refinement did, or about five seconds.
     """
     share = max(SHARE * runs.work, SEARCH)
     fewest = {rod: _fewest(runs, rod) for rod in rods}
@@ -53,34 +53,34 @@ def trim(runs: Runs, yardstick: Yardstick, rods: tuple[str, ...], tolerance: flo
         levels = {**runs.coarsest, **fewest, **{rod: runs.coarsest[rod] for rod in framed}}
         return runs.forecast.work(levels) / (max(STRIDES) if _few(levels) else 1.0)
 
-    found: list[Rung] = []
+    found: list[Candidate] = []
     for framed in sorted(ways, key=least):
-        if found and min(rung.work for rung in found) <= least(framed):
+        if found and min(candidate.work for candidate in found) <= least(framed):
             break
-        start = _start(runs, yardstick, framed, tolerance)
-        rung = _down(runs, yardstick, start, rods, tolerance, runs.work + share) if start else None
-        found += [rung] if rung else []
+        start = _start(runs, reference, framed, tolerance)
+        candidate = _down(runs, reference, start, rods, tolerance, runs.work + share) if start else None
+        found += [candidate] if candidate else []
     if not found:
-        finest = judged(runs, yardstick, yardstick.base), yardstick.rung
-        found = [rung for rung in finest if rung.error <= tolerance]
-    return min(found, key=lambda rung: rung.work, default=None)
+        finest = judged(runs, reference, reference.base), reference.candidate
+        found = [candidate for candidate in finest if candidate.error <= tolerance]
+    return min(found, key=lambda candidate: candidate.work, default=None)
 
 
-def _start(runs: Runs, yardstick: Yardstick, framed: Sequence[str], tolerance: float) -> Rung | None:
-    """The base with some rods in frames, rigid ones if that is near enough; None if it is with no number of modes."""
+def _start(runs: Runs, reference: Reference, framed: Sequence[str], tolerance: float) -> Candidate | None:
+    """Return the base with some rods in floating frames, rigid if that is accurate enough; None if no modes suffice."""
     if any(runs.coarsest[rod].element not in FRAMED for rod in framed):
         return None
     if not framed:
-        return judged(runs, yardstick, yardstick.base)
-    rigid = judged(runs, yardstick, yardstick.base | {rod: runs.coarsest[rod] for rod in framed})
+        return judged(runs, reference, reference.base)
+    rigid = judged(runs, reference, reference.base | {rod: runs.coarsest[rod] for rod in framed})
     if rigid.error <= WITHIN * tolerance:
         return rigid
-    most = judged(runs, yardstick, yardstick.base | _modes(runs, yardstick, framed))
+    most = judged(runs, reference, reference.base | _modes(runs, reference, framed))
     return most if most.error <= HOPEFUL * tolerance else None
 
 
-def _modes(runs: Runs, yardstick: Yardstick, framed: Sequence[str]) -> dict[str, Level]:
-    """Of these rods as many modes as take the same step, the most with which the model costs less than the base."""
+def _modes(runs: Runs, reference: Reference, framed: Sequence[str]) -> dict[str, Level]:
+    """Return numbers of modes that allow one step, the largest with which the model costs less than the base."""
     steps = {
         rod: {
             one: runs.forecast.step({rod: one})
@@ -92,13 +92,13 @@ def _modes(runs: Runs, yardstick: Yardstick, framed: Sequence[str]) -> dict[str,
     frames = dict[str, Level]()
     for shortest in sorted({step for taken in steps.values() for step in taken.values()}):
         frames = {rod: [one for one, step in taken.items() if step >= shortest][-1] for rod, taken in steps.items()}
-        if runs.forecast.work(yardstick.base | frames) < runs.forecast.work(yardstick.base):
+        if runs.forecast.work(reference.base | frames) < runs.forecast.work(reference.base):
             break
     return frames
 
 
 def _fewest(runs: Runs, rod: str) -> Level:
-    """The cheapest level of a rod that has elements."""
+    """Return the cheapest level of a rod that has elements."""
     fewest = dict[str, Level]()
     for level in LADDERS[runs.limits[rod]]:
         if level.element not in (*FRAMED, *fewest) and runs.knows(rod, level):
@@ -107,36 +107,38 @@ def _fewest(runs: Runs, rod: str) -> Level:
 
 
 def _down(
-    runs: Runs, yardstick: Yardstick, base: Rung, rods: tuple[str, ...], tolerance: float, enough: float
-) -> Rung | None:
-    """The cheapest rung found below a base within the tolerance; None if none is.
+    runs: Runs, reference: Reference, base: Candidate, rods: tuple[str, ...], tolerance: float, enough: float
+) -> Candidate | None:
+    """Return the cheapest candidate coarser than a base and within the tolerance; None if none is.
 
-    Each rod alone goes down from the base. Their errors are taken to add up, which tells the combinations worth
-    trying, the cheapest first; what counts is the distance of the combination itself from the yardstick.
+    Each rod is coarsened alone. The sums of their errors choose the combinations to try, the cheapest first; the
+    distance of a combination itself from the reference decides.
     """
     tables: dict[str, dict[Level, float]] = {}
     context = base
     for rod in sorted(rods, key=lambda rod: -runs.forecast.own(rod, base.levels[rod])):
-        tables[rod] = table = _alone(runs, yardstick, context, rod, tolerance, enough)
+        tables[rod] = table = _alone(runs, reference, context, rod, tolerance, enough)
         harmless = [level for level, part in table.items() if part <= HARMLESS * tolerance]
         cheapest = min(harmless, key=lambda level: runs.forecast.own(rod, level))
-        context = judged(runs, yardstick, {**context.levels, rod: cheapest})
+        context = judged(runs, reference, {**context.levels, rod: cheapest})
     for rod, table in tables.items():
         if not np.all(np.isfinite(list(table.values()))):  # other rods, as fine as they were, may have diverged
-            again = _alone(runs, yardstick, context, rod, tolerance, enough)
+            again = _alone(runs, reference, context, rod, tolerance, enough)
             table |= {level: part for level, part in again.items() if part < table.get(level, np.inf)}
     combinations = _combinations(runs, base, tables, tolerance)
     for levels in combinations[:TRIES]:
         if runs.work > enough:
             break
-        rung = judged(runs, yardstick, levels)
-        if rung.error <= WITHIN * tolerance:
-            return _strided(runs, yardstick, combinations, tolerance, rung)
+        candidate = judged(runs, reference, levels)
+        if candidate.error <= WITHIN * tolerance:
+            return _strided(runs, reference, combinations, tolerance, candidate)
     return None
 
 
-def _strided(runs: Runs, yardstick: Yardstick, combinations: list[Levels], tolerance: float, found: Rung) -> Rung:
-    """A cheaper rung within the tolerance by longer steps with capped inertia, or else the one that was found.
+def _strided(
+    runs: Runs, reference: Reference, combinations: list[Levels], tolerance: float, found: Candidate
+) -> Candidate:
+    """Return a cheaper candidate within the tolerance by longer steps with capped inertia, else the one given.
 
     Models whose mass matrix is not inverted as a whole lose more by the capped one than longer steps gain.
     """
@@ -145,11 +147,11 @@ def _strided(runs: Runs, yardstick: Yardstick, combinations: list[Levels], toler
     cheaper = [one for one in longer if one[0] < CHEAPER * found.work]
     for _, stride, levels in sorted(cheaper, key=lambda one: one[0])[:TRIES]:
         try:
-            rung = judged(runs, yardstick, levels, stride * STEP_MARGIN)
+            candidate = judged(runs, reference, levels, stride * STEP_MARGIN)
         except InputError:
             continue  # bending is as fast as stretching
-        if rung.error <= WITHIN * tolerance:
-            return rung
+        if candidate.error <= WITHIN * tolerance:
+            return candidate
     return found
 
 
@@ -158,24 +160,24 @@ def _few(levels: Levels) -> bool:
     return cappable and sum(VECTORS[level.element] * level.elements for level in levels.values()) <= FEW
 
 
-def judged(runs: Runs, yardstick: Yardstick, levels: Levels, fraction: float = STEP_MARGIN) -> Rung:
-    """The run on these levels with its estimated error."""
-    rung = runs(levels, fraction, role="candidate")
-    rung.error = distance(rung.trajectory, yardstick.rung.trajectory) + yardstick.error
-    return rung
+def judged(runs: Runs, reference: Reference, levels: Levels, fraction: float = STEP_MARGIN) -> Candidate:
+    """Run these levels and estimate their error by the reference."""
+    candidate = runs(levels, fraction, role="candidate")
+    candidate.error = distance(candidate.trajectory, reference.candidate.trajectory) + reference.error
+    return candidate
 
 
 def _alone(
-    runs: Runs, yardstick: Yardstick, context: Rung, rod: str, tolerance: float, enough: float
+    runs: Runs, reference: Reference, context: Candidate, rod: str, tolerance: float, enough: float
 ) -> dict[Level, float]:
-    """Distance from the context [m] of the models in which one rod alone is coarser, until so much work is done."""
+    """Return the distances from the context [m] of models in which one rod is coarser, until `enough` work is done."""
     start = context.levels[rod]
     table = {start: 0.0}
 
     def miss(level: Level) -> float:
-        rung = judged(runs, yardstick, {**context.levels, rod: level})
-        table[level] = distance(rung.trajectory, context.trajectory)
-        return rung.error
+        candidate = judged(runs, reference, {**context.levels, rod: level})
+        table[level] = distance(candidate.trajectory, context.trajectory)
+        return candidate.error
 
     lower = [level for level in below(start, runs.limits[rod], runs.coarsest[rod]) if runs.knows(rod, level)]
     if start.element in FRAMED:
@@ -198,8 +200,8 @@ def _alone(
     return table
 
 
-def _combinations(runs: Runs, base: Rung, tables: dict[str, dict[Level, float]], tolerance: float) -> list[Levels]:
-    """Combinations that may meet the tolerance, by foreseen work."""
+def _combinations(runs: Runs, base: Candidate, tables: dict[str, dict[Level, float]], tolerance: float) -> list[Levels]:
+    """Return the combinations that may meet the tolerance, by forecast work."""
     found = []
     for chosen in product(*tables.values()):
         levels = {**base.levels, **dict(zip(tables, chosen, strict=True))}

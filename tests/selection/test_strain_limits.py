@@ -8,7 +8,7 @@ from shoal.mechanics.assembly.build import build
 from shoal.mechanics.states import States
 from shoal.scene import Scene
 from shoal.selection import select
-from shoal.selection.beyond import folded, torn
+from shoal.selection.strain_limits import excessive_strain, excessive_torques
 from shoal_validation.selection.machines import draw
 
 
@@ -19,7 +19,7 @@ def test_a_torque_under_which_no_theory_holds_is_named(torque: float, strain: fl
     rod = scene.bodies["A"]
     half = torque * 2 * rod.youngs_modulus * rod.width * rod.height**3 / 12 / rod.height
     scene = scene.with_values({"loads.load.torque": half})
-    said = folded(scene, ["A"])
+    said = excessive_torques(scene, ["A"])
     assert said == "" if strain is None else f"load bends A to a strain of {strain:g} " in said
 
 
@@ -64,7 +64,7 @@ def test_what_acts_at_one_end_is_told_together(others: dict, strain: float | Non
         if isinstance(load.get("torque"), float):
             load = load | {"torque": load["torque"] * unit}
         data["loads"][name] = load
-    said = folded(Scene.parse(data), ["A"])
+    said = excessive_torques(Scene.parse(data), ["A"])
     assert said == "" if strain is None else f"to a strain of {strain:g} " in said
 
 
@@ -111,7 +111,7 @@ def _bent(curvature: float, shear: float) -> tuple[Scene, States]:
 )
 def test_shear_is_that_of_the_axis_against_the_normals(curvature: float, shear: float, said: str) -> None:
     scene, states = _bent(curvature, shear)
-    found = torn(scene, states, np.array([0.0, 0.3]))
+    found = excessive_strain(scene, states, np.array([0.0, 0.3]))
     assert found.startswith(said)
     assert bool(found) == bool(said)
 
@@ -121,18 +121,18 @@ def test_bending_is_that_of_the_surface(strain: float) -> None:
     """Curvature times half the height."""
     scene, states = _bent(strain * 2 / HEIGHT, 0.0)
     said = f"A has a strain of bending at its surface of {strain:g} after 0.3 s"
-    assert torn(scene, states, np.array([0.0, 0.3])).startswith(said if strain > 1 else "")
-    assert bool(torn(scene, states, np.array([0.0, 0.3]))) == (strain > 1)
+    assert excessive_strain(scene, states, np.array([0.0, 0.3])).startswith(said if strain > 1 else "")
+    assert bool(excessive_strain(scene, states, np.array([0.0, 0.3]))) == (strain > 1)
 
 
 def test_what_a_motion_that_is_not_believed_is_strained_by_is_nothing_of_the_rods() -> None:
     """Asked of the time when the strain is too large first, and only then."""
     scene, states = _bent(0.0, 1.5)
     asked = list[float]()
-    assert torn(scene, states, np.array([0.0, 0.3]), lambda until: bool(asked.append(until))) == ""
+    assert excessive_strain(scene, states, np.array([0.0, 0.3]), lambda until: bool(asked.append(until))) == ""
     assert asked == [0.3]
     scene, states = _bent(0.0, 0.5)
-    assert torn(scene, states, np.array([0.0, 0.3]), lambda until: bool(asked.append(until))) == ""
+    assert excessive_strain(scene, states, np.array([0.0, 0.3]), lambda until: bool(asked.append(until))) == ""
     assert asked == [0.3]
 
 
@@ -146,4 +146,4 @@ def test_runs_that_tear_a_rod_end_the_search(seed: int, said: str, elements: int
     found = select(machine.scene, machine.tolerance)
     assert not found.met
     assert said in found.reason
-    assert max(rod.elements for rung in found.rungs for rod in rung.levels.values()) == elements
+    assert max(rod.elements for candidate in found.candidates for rod in candidate.levels.values()) == elements
