@@ -63,7 +63,7 @@ def _candidate(name: str, size: Size, scene: Scene) -> Candidate:
 
     def tell(values: Array) -> tuple[float, str]:
         stiffness, torque = values.tolist()
-        if abs(torque) > _CONSTANT * stiffness:
+        if abs(torque) >= _CONSTANT * stiffness:  # none at all is one too
             return torque, f"a constant torque of {torque:.3g} N m"
         return stiffness, f"a stiffness of {stiffness:.3g} N m/rad, at rest at {torque / stiffness:.3g} rad"
 
