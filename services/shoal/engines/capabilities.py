@@ -1,4 +1,4 @@
-"""What a scene needs of an engine, and the one line that refuses a scene that needs more than an engine can do."""
+"""Requirements of a scene, and the message that refuses a scene whose requirements an engine does not meet."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ _LAWS = {"elastic": "nonlinear springs", "length": "varying distances"}
 
 
 def needs(scene: Scene) -> Iterator[tuple[str, str]]:
-    """What a scene needs: the field that asks for it, and the kind or feature."""
+    """Yield the requirements of a scene: the field that states each, and the kind or feature."""
     if scene.dimensions == 3:
         yield "dimensions", "machines in space"
     for name, body in scene.bodies.items():
@@ -130,7 +130,7 @@ def check_acceleration(scene: Scene) -> None:
 
 
 def of_kind(table: Mapping[str, T], kind: str, where: str) -> T:
-    """The entry for a kind that a field names. Raises InputError for a kind that somebody forgot."""
+    """Return the entry for a kind that a field names. Raises InputError for a kind without an entry."""
     if kind not in table:
         raise InputError(f"{where}: {kind} is not among {', '.join(table)}")
     return table[kind]

@@ -48,7 +48,7 @@ class Comparison:
 
     @property
     def complaint(self) -> str:
-        """Why `ok` is not so, in one line: every reason; empty if it is."""
+        """Return why `ok` is false, every reason in one line; empty if it is true."""
         wrong = {name: motion.message for name, motion in self.trajectories.items() if not motion.ok}
         said = [f"{name} refuses the scene: {reason}" for name, reason in self.refused.items()]
         said += [f"{name}: {reason}" for name, reason in wrong.items()]
@@ -90,7 +90,7 @@ class Comparison:
 
 
 def compared(scene: Scene) -> list[str]:
-    """Who runs a scene unless others are named: our solver and at most two that can do all that it needs."""
+    """Return the default engines of a comparison: the native solver and at most two that meet the requirements."""
     return able(scene, COMPARED)[:3]
 
 

@@ -20,10 +20,10 @@ Extremes = dict[tuple[str, ...], list[tuple[float, float]]]
 
 @dataclass(frozen=True)
 class Capabilities:
-    """What an engine can simulate; the comparison, the refusals and the tests read it.
+    """Capabilities of an engine, which comparisons, refusals and tests read.
 
     elements, joints, loads: kinds, by the names a scene uses
-    features: what a scene may need beyond these (see `capabilities.FEATURES`)
+    features: requirements of scenes beyond these (see `capabilities.FEATURES`)
     lanes: whether many scenes run side by side in one compiled call
     """
 
@@ -49,7 +49,7 @@ class Engine(Protocol):
 
     @property
     def capabilities(self) -> Capabilities:
-        """What it can simulate."""
+        """Return what the engine can simulate."""
         ...
 
     def simulate(self, scene: Scene, times: Sequence[float] | Array | None = None) -> Trajectory:

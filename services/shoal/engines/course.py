@@ -80,7 +80,7 @@ class Course:
         return self._slope(min(t, self.clock.until), left=False)
 
     def jumps(self) -> list[float]:
-        """Where its slope jumps [s]."""
+        """Return the instants at which its slope jumps [s]."""
         sides = [(t, self._slope(t, left=True), self._slope(t, left=False)) for t in self.kinks.tolist()]
         return [t for t, a, b in sides if abs(b - a) > SLOPE_JUMP * (1.0 + abs(a))]
 

@@ -11,10 +11,10 @@ from typing import Any
 
 @contextmanager
 def interruptible() -> Iterator[None]:
-    """Raise KeyboardInterrupt at the end of the block if it came within, whatever became of it there.
+    """Raise KeyboardInterrupt at the end of the block if it came within it.
 
-    Callbacks raise it inside of Exudyn and CasADi, which make it a RuntimeError, or nothing. Only the main thread hears
-    of signals; elsewhere, and where somebody ignores them, nothing is done.
+    Exudyn and CasADi turn an interrupt in a callback into a RuntimeError, or ignore it. Only the main thread receives
+    signals; in others, and where SIGINT is ignored, nothing is done.
     """
     usual = signal.getsignal(signal.SIGINT)
     if threading.current_thread() is not threading.main_thread() or not callable(usual):

@@ -22,9 +22,9 @@ def one_by_one(
     times: Sequence[float] | Array | None = None,
     **options: bool,
 ) -> Trajectory:
-    """One scene per lane, one after the other; a lane that failed is not a number and has its status.
+    """Simulate the lanes one after the other; a lane that failed is NaN and has its status.
 
-    options: of the engine's `simulate`; states that it tells come with the model of the first lane that has them
+    options: of the engine's `simulate`; states come with the model of the first lane that has them
     """
     started = time.perf_counter()
     require(engine, scene)

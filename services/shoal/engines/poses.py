@@ -1,4 +1,4 @@
-"""Where every body of a scene starts, for engines that give each body a pose of its own."""
+"""Initial poses of all bodies, for engines in absolute coordinates."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class InitialPose:
         return place[0] * axis + place[1] * normal(axis)
 
     def position(self, place: tuple[float, float]) -> Array:
-        """Where a place of the body is [m], (2,)."""
+        """Return the position of a point of the body [m], (2,)."""
         return self.origin + self.arm(place)
 
     def speed(self, place: tuple[float, float]) -> Array:
@@ -53,7 +53,7 @@ def owner(at: Attachment) -> str:
 
 
 def start_of(scene: Scene, poses: dict[str, InitialPose], at: Attachment) -> Array:
-    """Where an attachment is at the start [m], (2,)."""
+    """Return the position of an attachment at the start [m], (2,)."""
     place = complex(place_of(scene, at))
     return poses[owner(at)].position((place.real, place.imag))
 

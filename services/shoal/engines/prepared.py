@@ -26,11 +26,11 @@ KEPT = 16
 
 
 class Prepared:
-    """A scene that the native solver simulates again and again: call it.
+    """A scene that the native solver simulates repeatedly; call it to simulate.
 
-    What the scene alone tells is worked out once: its model, its integrator and the stability limit of that, how far it
-    reaches, how it starts. A run that is repeated computes nothing of this again, and marches in memory that is there
-    already. Threads may call it at the same time: each call takes a work space for itself.
+    What depends on the scene alone is computed once: its model, its integrator and stability limit, its reach and its
+    start. Repeated runs use it, in memory that exists already. Threads may call it at the same time: each call takes a
+    work space of its own.
 
     Attributes:
         scene: the scene
@@ -60,12 +60,12 @@ class Prepared:
         *,
         whole: bool = False,
     ) -> Trajectory:
-        """The motion, as `shoal.simulate` without its second runs gives it, to the last bit.
+        """Return the motion of `shoal.simulate` without its second runs, to the last bit.
 
         values: fields of the scene to set, by dotted path; one-dimensional numpy arrays have one number per lane, and
-        what is the same in all lanes may be a number. times: sampling instants [s], else the scene's own. New values
-        make a new model, but for lanes that only start differently: they share the scene's model and its integrator.
-        whole: whether the trajectory tells its states, which no swarm does. Raises InputError.
+        values equal in all lanes may be numbers. times: sampling instants [s], else the scene's own. New values
+        make a new model; lanes that only start differently share the scene's model and integrator.
+        whole: whether the trajectory holds its states, which those of swarms do not. Raises InputError.
         """
         lanes = {path: value for path, value in values.items() if _of_lanes(value)} if values else {}
         if values and len(lanes) < len(values):
@@ -139,6 +139,6 @@ def _of_lanes(value: Any) -> bool:
 
 
 def _forget(kept: dict[Any, Any]) -> None:
-    """Leave out the oldest entries beyond so many."""
+    """Remove the oldest entries beyond the limit."""
     for old in list(kept)[:-KEPT]:
         kept.pop(old, None)

@@ -1,6 +1,6 @@
-"""An engine behind a service: whatever takes an engine's name also takes the address of one.
+"""Client of an engine behind a service; its address can stand wherever an engine's name can.
 
-Doubles cross as JSON in their shortest form, which gives back every bit; what is not finite comes back as nan.
+Doubles cross as JSON in their shortest form, which gives back every bit; values that are not finite come back as NaN.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class RemoteEngine:
 
     @cached_property
     def capabilities(self) -> Capabilities:
-        """What the engine there can simulate. Raises InputError, ComputationError."""
+        """Return what the remote engine can simulate. Raises InputError, ComputationError."""
         found: Capabilities = self.ask("GET", "/v1/capabilities", read=_capabilities_of)
         return found
 

@@ -1,4 +1,4 @@
-"""A sweep is believed as far as some of its points, run alone and once more with care, bear it out."""
+"""Spot checks of a sweep: some of its points are run alone and verified by more careful runs."""
 
 from __future__ import annotations
 

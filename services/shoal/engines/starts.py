@@ -34,7 +34,7 @@ class Value:
 
 @dataclass(frozen=True)
 class Elsewhere:
-    """So many of some runs start elsewhere than stated, as the joints demand it; values: what gives way."""
+    """Runs that start elsewhere than stated, as the joints require it; values: the stated ones that are not kept."""
 
     runs: int
     elsewhere: int
@@ -52,14 +52,14 @@ class Elsewhere:
         return f"{self.elsewhere} of {self.runs} {runs} start elsewhere than stated, as the joints demand: {values}"
 
     def to_json(self) -> dict[str, Any]:
-        """As plain data: how many, and by path of a value how many runs, how far at most, and its unit."""
+        """Return plain data: the number of runs, and by path of a value the number, the largest change and its unit."""
         values = {one.path: {"runs": one.runs, "by": one.by, "unit": one.unit} for one in self.values}
         return {"runs": self.runs, "elsewhere": self.elsewhere, "values": values}
 
 
 @dataclass(frozen=True)
 class Stated:
-    """What is stated of the start of a scene and is no guess, beside which runs are seen to start elsewhere.
+    """Stated values of the start of a scene that are no guesses, with which starts of runs are compared.
 
     values: body and quantity of each
     """
@@ -68,11 +68,11 @@ class Stated:
 
     @classmethod
     def of(cls, scene: Scene, varied: Iterable[str] = ()) -> Stated:
-        """Of a scene; varied: paths whose values the runs state."""
+        """Return those of a scene; varied: paths whose values the runs state."""
         return cls(scene.statements(varied))
 
     def given_way(self, changed: Mapping[str, Any]) -> dict[tuple[str, Quantity], Mapping[str, Any]]:
-        """Of what `Trajectory.changed` tells of a run, by body and quantity, that which was stated."""
+        """Return the stated values, by body and quantity, among those of `Trajectory.changed` of a run."""
         found = {}
         for body, quantity in self.values:
             quantities = changed.get(body, {})
@@ -82,12 +82,12 @@ class Stated:
         return found
 
     def away(self, changed: Mapping[str, Any]) -> Array:
-        """How far a run starts from each value, zero where it keeps it, (values,)."""
+        """Return the distance of a run's start from each value, zero where it is kept, (values,)."""
         found = self.given_way(changed)
         return np.array([_apart(found[one]) if one in found else 0.0 for one in self.values])
 
     def elsewhere(self, away: Array) -> Elsewhere:
-        """Of runs that start so far from each value, (runs, values)."""
+        """Summarise the distances from each value, (runs, values)."""
         count, most = (away > 0).sum(axis=0), away.max(axis=0, initial=0.0)
         values = tuple(
             Value(f"initial.{body}.{quantity}", int(number), float(by), UNITS[quantity])
@@ -98,14 +98,14 @@ class Stated:
 
 
 class Tally:
-    """What is seen of runs that are made one batch after the other; stated: see there."""
+    """Accumulates the starts of runs over batches; stated: see `Stated`."""
 
     def __init__(self, stated: Stated) -> None:
         self.stated = stated
         self._away: list[Array] = []
 
     def of(self, motion: Trajectory) -> Array:
-        """How far every lane of a motion starts from each value, (lanes, values)."""
+        """Return the distance of each lane's start from each value, (lanes, values)."""
         found = np.zeros((motion.lanes, len(self.stated.values)))
         if found.size:
             for lane in range(motion.lanes):
@@ -119,7 +119,7 @@ class Tally:
 
     @property
     def elsewhere(self) -> Elsewhere:
-        """Of all runs that were counted."""
+        """Summarise all runs so far."""
         return self.stated.elsewhere(np.concatenate([np.zeros((0, len(self.stated.values))), *self._away]))
 
 

@@ -8,13 +8,13 @@ least-norm particular solution y_p and an orthonormal basis N. Its unit is that 
 What the paper leaves open:
 - the box of the first swarm: |x_j| <= |y_f|, because the optimum N' y_f is never longer than y_f;
 - x_0 of step 3-2, the optimum of the unconstrained function: N' y_f, which is the free acceleration carried into the
-  null space by the mass metric. There it is the optimum of the constrained function as well, so with this seed the
-  swarm is handed the answer;
+  null space by the mass metric. There it is the optimum of the constrained function as well, so this seed is
+  the answer;
 - q_{tau-1} of step 3-2, the optimum of the previous time step, carried into the present null space likewise;
 - what is returned: the best fish ever seen, or (`keep_best` off) the P_g of step 3-7, which the printed steps forget.
 
-A swarm that compares values of G cannot tell places apart whose G differs by less than its round-off: the acceleration
-is known to about the square root of that, 1e-8 of |y_f|, however long it swims. And what it finds is the minimiser,
+A swarm compares values of G, and cannot separate places whose G differs by less than round-off: the acceleration is
+known to about the square root of that, 1e-8 of |y_f|, after any number of iterations. It finds the minimiser,
 which at a singular position is in general not the acceleration of the motion (see `projection`).
 """
 
@@ -57,7 +57,10 @@ class Switches:
 
 @dataclass(frozen=True, kw_only=True)
 class Search:
-    """How the accelerations of a run are sought; progress(steps done, steps in all) is called after every step."""
+    """Settings of the search for the accelerations of a run.
+
+    progress(steps done, steps in all): called after every step
+    """
 
     switches: Switches = Switches()
     progress: Callable[[int, int], None] | None = None
@@ -119,7 +122,7 @@ class GaussFunction:
 
     @property
     def optimum(self) -> Array:
-        """Where G is least, (d,)."""
+        """Return the minimiser of G, (d,)."""
         return self.free @ self.basis
 
     @property
@@ -246,7 +249,7 @@ class Seeker:
             self.search.progress(min(number, self.steps), self.steps)
 
     def facts(self) -> dict[str, Any]:
-        """What the swarm did, for the record."""
+        """Return the statistics of the swarm, for the record."""
         solver = self.solver
         parts = {} if solver.acceleration == "afsa" else asdict(self.search.switches)
         size = {"size": solver.swarm_size, "iterations": solver.swarm_iterations, "seed": solver.swarm_seed}

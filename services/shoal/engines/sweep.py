@@ -53,9 +53,9 @@ class Sweep:
     """Marker positions and displacements from the start at `time` [s] over a grid.
 
     grid: path -> value of every point, (points,); positions, displacements [m]: marker -> (points, 2), not a number
-    where a point is not ok; check: what more careful runs of some points say, None if there were none
-    reasons: why each point is not ok, empty for one that is; changes: what each point uses in place of what is stated
-    of its start, see `Trajectory.changed`; stated: what of that counts
+    where a point is not ok; check: by more careful runs of some points, None without
+    reasons: why each point is not ok, empty for one that is; changes: values that each point uses in place of
+    stated ones of its start, see `Trajectory.changed`; stated: those that count
     """
 
     scene: Scene
@@ -78,7 +78,7 @@ class Sweep:
 
     @property
     def complaint(self) -> str:
-        """Why not all of it can be believed; empty if nothing speaks against it."""
+        """Return why parts of it are rejected; empty if none are."""
         wrong = [status for status in self.status if status is not Status.OK]
         if wrong:
             why = next(filter(None, self.reasons), "")
@@ -88,24 +88,24 @@ class Sweep:
 
     @property
     def message(self) -> str:
-        """Why not all of it can be believed, and whether some points start elsewhere than stated; empty if neither."""
+        """Return why parts of it are rejected, and whether points start elsewhere than stated; empty if neither."""
         return "; ".join(filter(None, (self.complaint, self.elsewhere.told("points"))))
 
     @property
     def errors(self) -> ErrorBudget:
-        """Of the markers [m], the largest of the points that were looked at; empty where none was."""
+        """Return the errors of the markers [m], the largest of the checked points; empty without checks."""
         return ErrorBudget() if self.check is None else self.check.errors
 
     @property
     def elsewhere(self) -> Elsewhere:
-        """How many of the points that may be believed start elsewhere than stated."""
+        """Summarise the accepted points that start elsewhere than stated."""
         good = (one for one, status in zip(self.changes, self.status, strict=False) if status is Status.OK)
         away = np.array([self.stated.away(one) for one in good])
         return self.stated.elsewhere(away.reshape(-1, len(self.stated.values)))
 
     @cached_property
     def begun(self) -> dict[str, tuple[Array, str]]:
-        """Where points start that do not keep a stated value: name -> values, (points,), not a number at others; unit.
+        """Return the starts of points that do not keep a stated value: name -> values (points,), NaN at others; unit.
 
         Names are `start.BODY.QUANTITY`, of vectors one for each component.
         """

@@ -1,4 +1,4 @@
-"""What the theory of a slender rod leaves out: shear, and the rotary inertia of its section."""
+"""Error of the theory of slender rods (Bernoulli-Euler): neglected shear and rotary inertia of the section."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def theory_deviations(
 
 
 def rigid_runs(scene: Scene, engine: str = "gauss") -> list[Scene]:
-    """The scene with rigid rods, without and with the rotary inertia of their section; none if it cannot be told."""
+    """Return the scene with rigid rods, without and with the rotary inertia of their section; none if that is unknown."""
     rods, slender = _rods(scene, engine in WITH_SHEAR)
     # A place on a curved rod is told by its arc length where it is flexible, by its coordinates where it is rigid.
     if not slender or any(rod.curvature or rod.side_curvature for rod in rods.values() if rod.element != "rigid"):
@@ -74,10 +74,10 @@ def _rods(scene: Scene, shearing: bool) -> tuple[dict[str, Rod], dict[str, Rod]]
 
 
 def softer(trajectory: Trajectory, scene: Scene, native: Engine) -> float | None:
-    """What shear and rotary inertia would move the markers by [m], where no rigid rod has the shape of a flexible one.
+    """Estimate by how much shear and rotary inertia would move the markers [m], where no rigid rod has the shape.
 
     By order of magnitude it is the distance from the run of a scene whose rods are softer by that share; None if it
-    cannot be told.
+    cannot be estimated.
     """
     _, slender = _rods(scene, trajectory.engine in WITH_SHEAR)
     values = {

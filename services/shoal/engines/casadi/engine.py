@@ -47,7 +47,7 @@ class CasadiEngine:
 
     @property
     def capabilities(self) -> Capabilities:
-        """What the tables of `tree` and `loads` hold; reading it asks for no library."""
+        """Return the kinds in the tables of `tree` and `loads`; no library is imported."""
         return Capabilities(
             elements=frozenset({"rigid", "ancf-cable"}),
             joints=frozenset({"revolute"}),

@@ -127,7 +127,7 @@ class _Segments:
         return np.concatenate([parameters, *states[1:]])
 
     def _towards(self, state: Array, position: Array, velocity: Array) -> Array:
-        """The state changed as little as shows the marker there, less where it could hardly be shown there."""
+        """Return the least change of the state that puts the marker there, damped where it has little effect."""
         q, v = np.split(state, 2)
         for _ in range(5):
             point, slope = (part.full() for part in self.seen(np.append(q, v)))
@@ -162,7 +162,7 @@ class _Segments:
         return ca.sumsqr(found[self.size : self.size + 2, :samples] - self.target.T) / samples
 
     def _gaps(self, found: Any, states: Any) -> Any:
-        """Where each segment ends minus where the next begins, one after the other."""
+        """Return the continuity gaps: the end of each segment minus the beginning of the next."""
         ends = found[: self.size, self.each - 1 : -1 : self.each]
         return ca.vec(ends - states[:, 1:])
 

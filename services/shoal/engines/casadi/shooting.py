@@ -47,14 +47,14 @@ _LEAST = 1e-3
 
 @dataclass(frozen=True)
 class ShootingResult:
-    """What shooting found, and what it cost.
+    """Result and cost of direct shooting.
 
     values: the identified values in the order of the paths [rad or rad/s], (parameters,)
     fitness: mean over the samples of |r - r_measured|^2 at `values` [m^2]
     forward_evaluations: simulations alone; gradient_evaluations: simulations with all first derivatives
     evaluations: forward simulation equivalents; a derivative is one more simulation per parameter
     wall_s: time of the optimisation; build_s: time to derive the model and its derivatives [s]
-    status, message: `ok` when the optimiser converged, else its own word for what happened
+    status, message: `ok` when the optimiser converged, else its own status
     """
 
     values: Array
@@ -119,7 +119,7 @@ def result(
     wall_s: float,
     build_s: float,
 ) -> ShootingResult:
-    """What an optimiser found, by its statistics. more: simulations beside its own; directions: of a derivative."""
+    """Make the result from the optimiser's statistics. more: further simulations; directions: of a derivative."""
     forward = more + _calls(stats, "nlp_f", "nlp_fg", "nlp_g")
     gradient = _calls(stats, "nlp_grad_f", "nlp_jac_fg", "nlp_jac_g", "nlp_hess_l")
     trusted = bool(stats["success"]) and np.isfinite(fitness)
@@ -138,12 +138,12 @@ def result(
 
 
 def left(limit: float | None, began: float) -> dict[str, Any]:
-    """What tells IPOPT the rest of a limit [s] that began at a time of `perf_counter`."""
+    """Return IPOPT's option for the rest of a time limit [s] that began at a time of `perf_counter`."""
     return {} if limit is None else {"ipopt.max_wall_time": max(limit - (time.perf_counter() - began), _LEAST)}
 
 
 def _calls(stats: dict[str, Any], *names: str) -> int:
-    """How often the optimiser called its functions of these names; IPOPT and SQP name theirs differently."""
+    """Count the calls of the functions of these names; IPOPT and SQP name theirs differently."""
     return sum(int(stats.get(f"n_call_{name}", 0)) for name in names)
 
 

@@ -1,4 +1,4 @@
-"""Exudyn: somebody else's elements, joints and integrators. Its library is imported when a scene is run."""
+"""Exudyn: independent elements, joints and integrators. Its library is imported when a scene is run."""
 
 from shoal.engines.exudyn.engine import ExudynEngine
 

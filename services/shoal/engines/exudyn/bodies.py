@@ -1,4 +1,4 @@
-"""What the engine asks of a body inside Exudyn, and the rigid body that answers."""
+"""Interface of bodies in Exudyn, and the rigid body."""
 
 from __future__ import annotations
 
@@ -39,7 +39,10 @@ class Energy(NamedTuple):
 
 
 class Holder(Protocol):
-    """What has places: a body or the ground. q, v: all coordinates and velocities of the system, (rows, unknowns)."""
+    """Base of what joints and loads attach to: a body or the ground.
+
+    q, v: all coordinates and velocities of the system, (rows, unknowns)
+    """
 
     def hold(self, system: System, place: Place) -> Any:
         """A new marker at a place [m] in its frame, for joints."""
@@ -82,7 +85,7 @@ class System:
         return getattr(self.mbs, f"Add{family}")(getattr(self.items, kind)(**options))
 
     def enter(self, what: str) -> None:
-        """What is entered next, by the field of the scene that states it."""
+        """Record the field of the scene that states the next items."""
 
     def function(self, make: Callable[..., Any], *given: Any) -> Any:
         """A function that Exudyn calls: what `make`, of `user`, makes of numbers and functions."""

@@ -42,7 +42,7 @@ class Chain:
         return index, 2 * (place[0] / self.size - index) - 1
 
     def values(self, shape: Array, q: Array) -> Array:
-        """What `shape` (points, functions) interpolates in each element, (rows, elements, points, components)."""
+        """Interpolate in each element by `shape` (points, functions): (rows, elements, points, components)."""
         functions, elements = shape.shape[1], len(self.elements)
         here: Array = q[:, self.columns].reshape(len(q), elements, functions, -1)
         return np.asarray(np.einsum("pf,refc->repc", shape, here))

@@ -18,10 +18,10 @@ from shoal.trajectory import Array
 
 
 class Exchange(NamedTuple):
-    """What a force element does with energy, from times [s] (rows,), q and v (rows, unknowns).
+    """Energy balance of a force element, from times [s] (rows,), q and v (rows, unknowns).
 
     lost: power it takes out of the machine [W], negative where it feeds it, (rows,); stored: energy [J], (rows,).
-    crossed: of the narrowest part of its law that each step crosses, how much at once, (rows - 1,); from q and v.
+    crossed: the share of the narrowest part of its law that each step crosses, (rows - 1,); from q and v.
     """
 
     lost: Callable[[Array, Array, Array], Array]
@@ -68,7 +68,7 @@ class Law:
         return {key: value for key, value in vars(self).items() if key != "elastic"}
 
     def options(self, system: System, keyword: str) -> dict[str, Any]:
-        """What Exudyn's connectors need to know; keyword: their name for a force in Python."""
+        """Return the options of Exudyn's connectors; keyword: their name for a force in Python."""
         options: dict[str, Any] = {"stiffness": max(self.stiffness, 0.0), "damping": self.damping}
         if not self.linear:
             make = user.spring_torque if keyword == "springTorqueUserFunction" else user.spring_force
@@ -139,7 +139,7 @@ def add_rail(ends: Ends, first: Attachment, second: Attachment, direction: float
 
 
 def exchange_of(law: Law, measure: Callable[[Array, Array], tuple[Array, Array]]) -> Exchange:
-    """What a law does with energy; measure: its argument [m or rad] and the rate of that, from q and v."""
+    """Return the energy balance of a law; measure: its argument [m or rad] and the rate of that, from q and v."""
 
     def lost(t: Array, q: Array, v: Array) -> Array:
         x, rate = measure(q, v)

@@ -46,7 +46,7 @@ class Ends:
         return [self.turn(first), self.turn(second, -turn)]
 
     def motion(self, at: Attachment, q: Array, v: Array) -> Motion:
-        """How an attachment moves."""
+        """Return the motion of an attachment."""
         part, place = self.part(at)
         return part.motion(q, v, place)
 

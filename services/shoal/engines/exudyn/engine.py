@@ -94,7 +94,7 @@ class ExudynEngine:
 
     @property
     def capabilities(self) -> Capabilities:
-        """What Exudyn can simulate here."""
+        """Return what this engine can simulate."""
         return Capabilities(
             elements=frozenset(PARTS[self.beam]) | SPATIAL_ELEMENTS[self.beam],
             joints=frozenset(JOINTS) | SPATIAL_JOINTS,
@@ -182,7 +182,7 @@ class ExudynEngine:
         return f"exudyn: {reason} at {reached:.6g} s of {record.steps.wanted[-1]:.6g} s; reduce solver.step"
 
     def simulation_settings(self, exu: Any, machine: Machine, steps: Steps) -> Any:
-        """Exudyn's settings for so many steps: fixed step, files off."""
+        """Return Exudyn's settings: fixed steps, no files."""
         settings = exu.SimulationSettings()
         settings.solution.file.write = False
         settings.solution.sensors.active = False
@@ -261,7 +261,7 @@ def _force_tolerance(machine: Machine) -> float:
 
 
 def _too_far(machine: Machine, record: Record) -> float:
-    """How many times too far the steps went across narrow parts of force laws."""
+    """Return by which factor the steps are too long for narrow parts of force laws."""
     kept = record.steps.kept
     one_step = (np.diff(kept) == 1) & np.isfinite(record.q[1:]).all(axis=1)
     return float(np.max(machine.crossed(record.q, record.v)[one_step], initial=0.0)) / CROSSED

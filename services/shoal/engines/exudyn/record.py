@@ -20,8 +20,8 @@ LARGEST_RECORD = 5_000_000
 class Steps:
     """`count` steps of `size` [s]; `kept` are the indices of those recorded, increasing, from 0 to count.
 
-    runs: one after the other, each of so many equal steps up to its end [s]; more than one where functions of time
-    want steps to end, and then `size` is the longest.
+    runs: number of equal steps and end [s] of successive runs; more than one where functions of time have
+    breakpoints, and then `size` is the longest step.
     """
 
     wanted: Array
@@ -32,7 +32,7 @@ class Steps:
 
     @property
     def instants(self) -> Array:
-        """Where the steps begin and end [s], (count + 1,)."""
+        """Return the instants at which steps begin and end [s], (count + 1,)."""
         if len(self.runs) == 1:
             return np.multiply(np.arange(self.count + 1), self.size, dtype=float)
         ends = [0.0, *(end for _, end in self.runs)]

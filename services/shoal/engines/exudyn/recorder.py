@@ -1,4 +1,4 @@
-"""What is entered into an Exudyn system, kept as the statements of a script that enters the same."""
+"""Recorder of the items of an Exudyn system, as statements of a script that makes the same system."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ class Recorder(System):
 
 
 def key_of(number: Any) -> Key:
-    """What tells an item's number from others."""
+    """Return the key of an item's number: its kind and its value."""
     return type(number).__name__, number.GetIndex()
 
 

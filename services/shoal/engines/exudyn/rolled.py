@@ -16,7 +16,7 @@ LEAST = 3
 
 @dataclass(frozen=True)
 class Block:
-    """Entries in so many turns of `period` each; one turn is no loop."""
+    """Entries of a loop: turns of `period` entries each; one turn is no loop."""
 
     entries: list[Entry]
     period: int
@@ -61,7 +61,7 @@ class Statements:
         self._lists: dict[Key, tuple[str, int]] = {}
 
     def name_of(self, key: Key) -> str:
-        """What a script calls an item."""
+        """Return the name of an item in the script."""
         if key in self._lists:
             name, row = self._lists[key]
             return f"{name}[{row}]"

@@ -115,7 +115,7 @@ class _Script:
         yield "mbs.Assemble()"
 
     def _about(self, where: str) -> str:
-        """What the field of a scene is, in a few words."""
+        """Describe a field of the scene in a few words."""
         parts = where.split(".")
         if len(parts) != 2 or parts[0] not in ("bodies", "joints", "loads"):
             return ""

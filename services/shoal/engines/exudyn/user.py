@@ -40,7 +40,7 @@ def torque_against(value: OfTime) -> Any:
 
 
 def law_force(law: dict[str, float], elastic: Any, x: Any, rate: Any) -> Any:
-    """What resists an elongation or angle x and its rate."""
+    """Return the resisting force or torque for an elongation or angle x and its rate."""
     return law["stiffness"] * x + law["cubic"] * x**3 + law_resisting(law, elastic, x, rate)
 
 
@@ -130,7 +130,7 @@ def products_slope(exu: Any, size: int, first: Any, second: Any) -> Any:
 
 
 def teeth(size: int, sides: Any, period: float, q: Any) -> tuple[Any, Any]:
-    """How far teeth are apart, but for multiples of a period [rad], and its derivative.
+    """Return the gap of gear teeth, modulo a period [rad], and its derivative.
 
     size: coordinates of the first node; sides: of both, the factor of its angle, a direction of its body, and the
     plane's two axes between which that turns.
@@ -160,12 +160,12 @@ def teeth_slope(exu: Any, size: int, sides: Any, period: float) -> Any:
 
 
 def cosine(value: OfTime, slope: OfTime) -> Any:
-    """That of an angle that is a function of time, and its rate."""
+    """Return the cosine of an angle that is a function of time, and its rate."""
     return lambda t: (np.cos(value(t)), -np.sin(value(t)) * slope(t))
 
 
 def sine(value: OfTime, slope: OfTime) -> Any:
-    """That of an angle that is a function of time, and its rate."""
+    """Return the sine of an angle that is a function of time, and its rate."""
     return lambda t: (np.sin(value(t)), np.cos(value(t)) * slope(t))
 
 

@@ -1,4 +1,4 @@
-"""MuJoCo: somebody else's relative coordinates. Its library is imported when a scene is run."""
+"""MuJoCo: an independent engine in relative coordinates. Its library is imported when a scene is run."""
 
 from shoal.engines.mujoco.engine import MujocoEngine
 

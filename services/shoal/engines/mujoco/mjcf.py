@@ -165,7 +165,7 @@ class Mjcf:
         return {name: repr(float(value)) for name, value in found.items() if value} | sticking
 
     def _shapes(self, element: ElementTree.Element, name: str) -> None:
-        """What is seen of a body and touches nothing: a rod's cuboid, or lines from a body's centre to its points."""
+        """Add the visible geometry of a body: a rod's cuboid, or lines from the centre to its points."""
         body, seen = self.scene.bodies[name], {"contype": "0", "conaffinity": "0", "mass": "0"}
         if isinstance(body, Rod) and not body.curvature:
             section = body.section_at(0.5)
@@ -194,7 +194,7 @@ class Mjcf:
         yield from (at for at in (*sides, *self.scene.markers.values()) if at is not None and at.body == body)
 
     def _tendons_and_actuators(self) -> dict[str, list[ElementTree.Element]]:
-        """What is not in the tree: loads, and joints that close loops."""
+        """Return the elements outside of the tree: loads, and joints that close loops."""
         found: dict[str, list[ElementTree.Element]] = {"tendon": [], "equality": [], "actuator": []}
         for name, load in self.scene.loads.items():
             if isinstance(load, Spring):

@@ -1,4 +1,4 @@
-"""What scenes have and MuJoCo's format has not."""
+"""Features of scenes that MuJoCo's format lacks."""
 
 from __future__ import annotations
 

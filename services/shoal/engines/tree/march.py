@@ -24,7 +24,7 @@ SMALLEST_STEP = 1e-13
 
 
 class Marched(NamedTuple):
-    """What a march leaves behind.
+    """Record of a run.
 
     states: y at the times, (times, coordinates + rates + 1); rotation, position: of the bodies, (times, bodies, 9 or 3)
     energy: kinetic, potential [J], (times, 2)

@@ -39,7 +39,7 @@ class Begin:
     spin: Array
 
     def point(self, place: Array) -> Array:
-        """Where a place of the body is [m]."""
+        """Return the position of a point of the body [m]."""
         return self.origin + self.axes @ place
 
     def speed(self, point: Array) -> Array:
@@ -139,7 +139,7 @@ def _body(body: Any, size: float) -> SpatialBody:
 
 
 def started(scene: Scene) -> tuple[dict[str, Begin], Any, dict[str, InitialState]]:
-    """The start of every body, and what tells where an axis that a joint states points then."""
+    """Return the start of every body, and a function for the direction of a stated joint axis at the start."""
     still = Begin(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
     found = {GROUND: still}
     if scene.dimensions == 2:

@@ -23,7 +23,7 @@ KINDS = {"fixed": FIXED, "revolute": REVOLUTE, "prismatic": PRISMATIC, "spherica
 
 
 class Tree(NamedTuple):
-    """What does not change while a tree moves; `bodies` rows count the ground as the first.
+    """Constant data of a tree; `bodies` rows count the ground as the first.
 
     parents, kinds, first_q, first_v: row of the parent, kind of joint, its first coordinate and rate, (bodies,)
     offset: joint in the parent's frame [m], (bodies, 3); turn: axes at coordinate zero in it, (bodies, 9)
@@ -52,14 +52,14 @@ class Tree(NamedTuple):
 
 
 class Room(NamedTuple):
-    """Where the recursion works, all in the axes of the fixed frame; one row per body.
+    """Work space of the recursion, in the axes of the fixed frame; one row per body.
 
     rotation: of the body's frame, (bodies, 9); position: of its origin [m], (bodies, 3)
-    turning, speed: omega [rad/s] and v [m/s]; turning_rate, speed_rate: epsilon and a, gravity felt, (bodies, 3)
+    turning, speed: omega [rad/s] and v [m/s]; turning_rate, speed_rate: epsilon and a less gravity, (bodies, 3)
     arm: from the parent's origin [m]; turn_bias, speed_bias: Tdot S + Ddot qdot, (bodies, 3)
     A, B, C: articulated inertia [A, B; B', C], (bodies, 6), (bodies, 9), (bodies, 6)
     torque, force: its bias, (bodies, 3)
-    turn_share, speed_share: what qddot takes of the parent's epsilon and a; of a spherical joint A^-1 and B
+    turn_share, speed_share: dependence of qddot on the parent's epsilon and a; of a spherical joint A^-1 and B
     rest: D^-1 times the force that is left for the joint, (bodies, 3)
     """
 
@@ -102,12 +102,12 @@ class ChainModel:
     body_turns: Array
 
     def coordinates(self, joint: str) -> slice:
-        """Where the coordinates of a joint stand in q."""
+        """Return the slice of the coordinates of a joint in q."""
         row = self.joints.index(joint) + 1
         return slice(int(self.tree.first_q[row]), int(self.tree.first_q[row]) + _coordinates(int(self.tree.kinds[row])))
 
     def rates(self, joint: str) -> slice:
-        """Where the rates of a joint stand in v."""
+        """Return the slice of the rates of a joint in v."""
         row = self.joints.index(joint) + 1
         return slice(int(self.tree.first_v[row]), int(self.tree.first_v[row]) + _rates(int(self.tree.kinds[row])))
 

@@ -48,7 +48,7 @@ class Side(NamedTuple):
 
 
 class SpatialHolder(Protocol):
-    """What has places in space: a body or the ground."""
+    """Base of what joints and loads attach to in space: a body or the ground."""
 
     def hold(self, system: System, place: Place) -> Any:
         """A new marker at a place [m] in its frame."""
@@ -63,7 +63,7 @@ class SpatialHolder(Protocol):
         ...
 
     def side(self, place: Place) -> Side:
-        """The node whose coordinates tell its directions there. Raises InputError."""
+        """Return the node whose coordinates define the directions there. Raises InputError."""
         ...
 
     def motion(self, q: Array, v: Array, place: Place) -> Any:
@@ -217,7 +217,7 @@ class SpatialCablePart(CablePart):
         )
 
     def _strains(self, q: Array, v: Array) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-        """Axial strain, and curvature |r' x r''| / |r'|^2 [1/m], whose rates nobody asks for."""
+        """Axial strain, and curvature |r' x r''| / |r'|^2 [1/m], whose rates are not needed."""
         (axial_points, _), (bending_points, _) = self._rules
         stretch = np.linalg.norm(self.values(self._shapes(axial_points)[1], q), axis=-1)
         slope, bend = (self.values(shape, q) for shape in self._shapes(bending_points)[1:])

@@ -82,7 +82,7 @@ def build_in_space(
 
 
 def _dependent(exu: Any, mbs: Any) -> int:
-    """How many constraints hold what others hold already; the native machine, which shares axes, may have fewer."""
+    """Count the redundant constraints; the native machine, which shares axes, may have fewer."""
     solver = importlib.import_module("exudyn.solver")
     with silence(exu):
         found = solver.ComputeSystemDegreeOfFreedom(mbs, threshold=DEPENDENT)

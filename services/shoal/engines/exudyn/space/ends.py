@@ -39,7 +39,7 @@ class SpatialEnds(Ends):
         return isinstance(self.part(at)[0], SpatialGround)
 
     def side(self, at: Attachment) -> Side:
-        """The node whose coordinates tell the directions there. Raises InputError."""
+        """Return the node whose coordinates define the directions there. Raises InputError."""
         part, place = self.part(at)
         side: Side = part.side(place)
         return side
@@ -54,7 +54,7 @@ class SpatialEnds(Ends):
         return np.asarray(image(self.scene, self.placement.attitudes, at, axis)[:, 0])
 
     def moved(self, at: Attachment, q: Array, v: Array) -> Motion:
-        """How an attachment moves."""
+        """Return the motion of an attachment."""
         part, place = self.part(at)
         motion: Motion = part.motion(q, v, place)
         return motion
