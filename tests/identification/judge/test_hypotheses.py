@@ -380,17 +380,20 @@ def test_a_bound_that_excludes_the_truth_is_named_and_nothing_else(tmp_path: Pat
     assert "widen its bounds" in found.advice[0]
 
 
-def test_radians_that_are_declared_as_degrees_are_named_beside_an_offset(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("declared", "factor"), [("deg", np.radians(1.0)), ("rad", np.degrees(1.0))])
+def test_a_wrong_unit_of_angles_is_named_beside_an_offset(declared: str, factor: float, tmp_path: Path) -> None:
+    """Of degrees that are taken for radians the reader takes off whole turns."""
     rng = np.random.default_rng(3)
     machine = pendulum(rng)
     times = np.linspace(0.0, machine.end, 121)
     (angle,) = recorded(machine, times, rng)
-    channel = {**machine.channels[0], "unit": "deg", "offset": -np.pi / 2}
-    data = pd.DataFrame({"t": times, "q": angle + np.pi / 2})
+    channel = {**machine.channels[0], "unit": declared, "offset": -np.pi / 2}
+    column = np.degrees(angle + np.pi / 2) if declared == "rad" else angle + np.pi / 2
+    data = pd.DataFrame({"t": times, "q": column})
     found = shoal.identify(posed(machine, tmp_path, channels=[channel]), data, method="least-squares")
     assert found.verdict is Verdict.REJECTED
     assert found.suspects[0].name == "unit of the angles"
-    assert found.suspects[0].value == pytest.approx(180 / np.pi)
+    assert found.suspects[0].value == pytest.approx(1.0 / factor)
 
 
 def springs(folder: Path, bounds: tuple[float, float], times: Array) -> Estimate:

@@ -39,6 +39,7 @@ class Recording:
     held: windows that are not fitted, whose samples are not among the others
     begin [s]: when the motion starts, by the clock of the table
     table: digest of the file that it is read from, whatever part of it; empty if there is none
+    turns [rad]: whole turns that were taken off the channels, (channels,) or the same for all
     """
 
     times: Array
@@ -51,6 +52,7 @@ class Recording:
     held: tuple[Held, ...] = ()
     begin: float = 0.0
     table: str = ""
+    turns: Array | float = 0.0
 
     def holding(self, windows: Sequence[tuple[float, float]], begin: float = 0.0) -> Recording:
         """With the samples of these windows [s] held out; begin [s]: the motion's start by their clock.

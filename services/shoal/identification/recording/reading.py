@@ -89,10 +89,11 @@ def sampled(source: FileSource, channels: tuple[Channel, ...]) -> tuple[Recordin
         _refuse_marks(numbers[inside], f"{path}: column {name!r}")
     notes = [f"the motion's time is zero at {begin:g} s, the first sample"] if source.start is None and begin else []
     notes = of_units + notes + (_mend(times, columns, channels) if source.swaps else [])
-    signals = []
-    for channel in channels:
+    signals, turns = [], np.zeros(len(channels))
+    for k, channel in enumerate(channels):
         signal, note = _signal(source, channel, columns, times, inside)
-        signals.append(_without_turns(signal, inside) if channel.quantity == "angle" else signal)
+        turns[k] = whole_turns(signal[inside]) if channel.quantity == "angle" else 0.0
+        signals.append(signal - turns[k])
         notes += note
     values = np.column_stack(signals)
     for channel, signal in zip(channels, values[inside].T, strict=True):
@@ -110,6 +111,7 @@ def sampled(source: FileSource, channels: tuple[Channel, ...]) -> tuple[Recordin
         notes=tuple(notes),
         begin=begin,
         table=table.digest,
+        turns=turns,
     )
     try:
         return found.holding(source.hold_out, begin), source
@@ -220,10 +222,10 @@ def _unwrapped(angle: Array, times: Array, turn: float, marker: str, inside: Mas
     return smooth, notes
 
 
-def _without_turns(angle: Array, inside: Mask) -> Array:
-    """An angle less its whole turns at the start of the window, which say nothing about the motion in it."""
-    known = angle[inside & np.isfinite(angle)][:1]
-    return angle - 2 * np.pi * np.round(known / (2 * np.pi)) if known.size else angle
+def whole_turns(angle: Array) -> float:
+    """Return the whole turns [rad] of the first known sample of an angle, which say nothing about the motion."""
+    known = angle[np.isfinite(angle)][:1]
+    return float(2 * np.pi * np.round(known[0] / (2 * np.pi))) if known.size else 0.0
 
 
 def _findings(times: Array, values: Array, channels: tuple[Channel, ...]) -> list[str]:

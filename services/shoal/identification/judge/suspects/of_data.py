@@ -11,6 +11,7 @@ import numpy as np
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.suspects.size import size_of
 from shoal.identification.recording.measurement import Recording
+from shoal.identification.recording.reading import whole_turns
 from shoal.identification.recording.source import Channel, units_of
 from shoal.trajectory import Array
 
@@ -124,9 +125,12 @@ def _read(model: ForwardModel, change: Callable[[Recording], Recording]) -> Forw
 def _scaled(quantities: set[str], factor: float) -> Callable[[Recording], Recording]:
     def change(run: Recording) -> Recording:
         factors = np.array([factor if channel.quantity in quantities else 1.0 for channel in run.channels])
-        # An offset is stated in SI units: what is read otherwise is the column.
+        # An offset is stated in SI units: what is read otherwise is the column, whole turns and all.
         offset = np.array([channel.offset for channel in run.channels])
-        return replace(run, values=offset + (run.values - offset) * factors, noise=run.noise * np.abs(factors))
+        values = offset + (run.values + run.turns - offset) * factors
+        turning = [channel.quantity == "angle" for channel in run.channels]
+        turns = np.where(turning, [whole_turns(column) for column in values.T], 0.0)
+        return replace(run, values=values - turns, noise=run.noise * np.abs(factors), turns=turns)
 
     return change
 
