@@ -47,7 +47,7 @@ def theory_deviations(
 
 
 def rigid_runs(scene: Scene, engine: str = "gauss") -> list[Scene]:
-    """Return the scene with rigid rods, without and with the rotary inertia of their section; none if that is unknown."""
+    """Return the scene with rigid rods, without and with the rotary inertia of sections; none if that is unknown."""
     rods, slender = _rods(scene, engine in WITH_SHEAR)
     # A place on a curved rod is told by its arc length where it is flexible, by its coordinates where it is rigid.
     if not slender or any(rod.curvature or rod.side_curvature for rod in rods.values() if rod.element != "rigid"):
