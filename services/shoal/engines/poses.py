@@ -77,7 +77,7 @@ def _check_speeds(scene: Scene, poses: dict[str, InitialPose]) -> None:
     u = np.concatenate([[*poses[name].origin, poses[name].angle] for name in scene.bodies])[None]
     v = np.concatenate([[*poses[name].velocity, poses[name].rate] for name in scene.bodies])
     rows = Closure(scene, u).rows(u)
-    slip = np.abs(rows.slope[0] @ v + rows.rate[0])
+    slip = np.abs(rows.along(v[None])[0] + rows.rate[0])
     for name, speed in zip(rows.names, slip, strict=True):
         if speed > SLIP * max(1.0, span(scene)):
             raise InputError(f"joints.{name}: its places start at {speed:.3g} m/s apart; change a rate under initial")

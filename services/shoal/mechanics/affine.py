@@ -15,6 +15,9 @@ import numpy as np
 
 from shoal.mechanics.numerics.tile import Array, Number
 
+ROUND_OFF = 1e-12
+"""Of the coefficients of a unit vector."""
+
 
 def is_zero(value: Number) -> bool:
     """Return whether a coefficient vanishes in every lane."""
@@ -43,6 +46,11 @@ class Affine:
 
     def __sub__(self, other: Affine) -> Affine:
         return self + other * -1.0
+
+    @property
+    def rests(self) -> bool:
+        """Return whether the vector depends on the coordinates by no more than round-off."""
+        return all(np.max(np.abs(coefficient)) <= ROUND_OFF for coefficient in self.terms.values())
 
     def turned(self, matrix: Array) -> Affine:
         """The vector mapped by a matrix, (d, d) or (d, d, lanes)."""

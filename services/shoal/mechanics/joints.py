@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from shoal.errors import InputError
+from shoal.mechanics.affine import fixed
 from shoal.mechanics.numerics.tile import Number
 from shoal.scene import (
     GROUND,
@@ -41,12 +42,20 @@ UnitVectors = dict[str, Any]
 
 
 class JointCondition:
-    """A condition of a joint between two places, with the forces that keep it.
+    """A condition of a joint between two places: its residual terms, and the forces that keep it.
 
-    They act on the second body at the second place, and oppositely on the first body there, and do no work in any
+    The forces act on the second body at the second place, and oppositely on the first body there, and do no work in any
     motion that the condition permits. A name in both mappings is one unknown, a force and a torque in proportion.
     motion: of the free bodies, an `analysis.free_motion.FreeMotion`
     """
+
+    def constrain(self, name: str, bodies: Any) -> None:
+        """Add the residual terms, which vanish where the condition holds, to `bodies.terms`.
+
+        name: of the joint. bodies: places and directions as vectors of the coordinates, either those of the machine
+        (`assembly.coordinates.Placement`) or of separate rigid bodies (`start.closure.Closure`).
+        """
+        raise unknown(self)
 
     def pushes(self, motion: Any) -> UnitVectors:
         """Return the forces per unit."""
@@ -69,6 +78,10 @@ class Meet(JointCondition):
     def within(self) -> bool:
         """Return whether both are of one body: a rod that closes upon itself."""
         return self.first.body == self.second.body
+
+    def constrain(self, name: str, bodies: Any) -> None:
+        """Require every component of the gap to vanish."""
+        bodies.terms.vanish(name, bodies.gap(bodies.scene, self))
 
     def pushes(self, motion: Any) -> UnitVectors:
         """Return the forces along the axes of the ground."""
@@ -93,6 +106,12 @@ class Along(JointCondition):
         """Return whether the line rests on the ground."""
         return self.first.body == GROUND and not isinstance(self.first.point, str) and not self.held
 
+    def constrain(self, name: str, bodies: Any) -> None:
+        """Require the gap to vanish across the line."""
+        gap = bodies.gap(bodies.scene, self)
+        for vector, form in bodies.across(self.first, self.direction):
+            bodies.terms.form(name, vector, gap, form, 1)
+
     def pushes(self, motion: Any) -> UnitVectors:
         """Return the forces across the line."""
         normals = motion.normals(motion.line(self.first, self.direction))
@@ -107,6 +126,10 @@ class Apart(JointCondition):
     first: Attachment
     second: Attachment
     length: Function | None
+
+    def constrain(self, name: str, bodies: Any) -> None:
+        """Require the length of the gap."""
+        bodies.keep_distance(name, bodies.gap(bodies.scene, self), self.length)
 
     def pushes(self, motion: Any) -> UnitVectors:
         """Return the force from place to place; of places that coincide, along the first axis."""
@@ -143,6 +166,10 @@ class Turned(JointCondition):
             return np.where(np.cos(ahead - self.either[0]) >= -1e-12, *self.either)
         return ahead if self.angle is None else self.angle
 
+    def constrain(self, name: str, bodies: Any) -> None:
+        """Require the angle between both directions."""
+        bodies.keep_angle(name, self)
+
     def twists(self, motion: Any) -> UnitVectors:
         """Return the torques about all axes."""
         return dict(motion.turns)
@@ -170,6 +197,10 @@ class Geared(JointCondition):
         """The largest number."""
         return max(map(abs, self.teeth))
 
+    def constrain(self, name: str, bodies: Any) -> None:
+        """Require the weighted sum of the angles that the start has, but for whole teeth."""
+        bodies.keep_mesh(name, self)
+
 
 @dataclass(frozen=True)
 class Sum(JointCondition):
@@ -177,6 +208,16 @@ class Sum(JointCondition):
 
     terms: tuple[CoupledCoordinate, ...]
     value: Function
+
+    def constrain(self, name: str, bodies: Any) -> None:
+        """Require the sum of the coordinates."""
+        axes = np.eye(bodies.scene.dimensions)
+        first = fixed(axes[0][:, None])
+        total = fixed(0.0 * first.constant)
+        for term in self.terms:
+            onto_first = np.outer(axes[0], term.factor * axes["xyz".index(term.axis)])
+            total = total + bodies.point(bodies.scene, term.at).turned(onto_first)
+        bodies.terms.dot(name, first, total, 1, drive=self.value.through("neg"))
 
 
 @dataclass(frozen=True)
@@ -204,6 +245,11 @@ class Square(JointCondition):
     axis: Vector3 | None
     second_axis: Vector3 | None
 
+    def constrain(self, name: str, bodies: Any) -> None:
+        """Require the scalar product of both axes to vanish."""
+        one, other = bodies.axis(self.first.body, self.axis), bodies.axis(self.second.body, self.second_axis)
+        bodies.terms.dot(name, one, other, 0)
+
     def twists(self, motion: Any) -> UnitVectors:
         """Return the torque across both axes."""
         across = np.cross(motion.axis(self.first, self.axis), motion.axis(self.second, self.second_axis))
@@ -218,6 +264,11 @@ class InPlane(JointCondition):
     second: Attachment
     axis: Vector3
 
+    def constrain(self, name: str, bodies: Any) -> None:
+        """Require the gap to vanish along the axis."""
+        gap = bodies.gap(bodies.scene, self)
+        bodies.terms.dot(name, bodies.axis(self.first.body, self.axis), gap, 1)
+
     def pushes(self, motion: Any) -> UnitVectors:
         """Return the force across the plane."""
         return {"normal": motion.held_axis(self.first.body, self.axis)}
@@ -231,6 +282,12 @@ class Hinged(JointCondition):
     second: Attachment
     angle: Function
     axis: Vector3
+
+    def constrain(self, name: str, bodies: Any) -> None:
+        """Require the cosine and the sine of the angle about the axis."""
+        flat, towards, ahead = bodies.hinge(self.first, self.second, self.axis)
+        bodies.terms.dot(name, flat, towards, 0, drive=self.angle.through("cos", "neg"))
+        bodies.terms.dot(name, ahead, towards, 0, drive=self.angle.through("sin", "neg"))
 
     def twists(self, motion: Any) -> UnitVectors:
         """Return the torque about the axis."""

@@ -16,7 +16,6 @@ from shoal.mechanics.affine import Affine
 from shoal.mechanics.analysis.evaluate import points
 from shoal.mechanics.analysis.free_bodies import FreeBodies
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
-from shoal.mechanics.assembly.space.holding import direction, line_of
 from shoal.mechanics.assembly.space.sections import image
 from shoal.mechanics.frames import BeamFrame, Frame, PointFrame
 from shoal.mechanics.numerics.tile import Array
@@ -122,7 +121,7 @@ class FreeMotion:
         if self.turn_axes == 1:
             held = self.placement.direction(self.scene, first).turned(plane.rotation(along))
             return self._everywhere(_unit(self.value(held)))
-        return self._everywhere(self.value(line_of(self._placement, first.body, along)))
+        return self._everywhere(self.value(self._placement.line(first.body, along)))
 
     def normals(self, line: Array) -> list[Array]:
         """Return the unit vectors at right angles to one, (samples, d) each: one in the plane, two in space."""
@@ -132,7 +131,7 @@ class FreeMotion:
 
     def held_axis(self, body: str, axis: Any) -> Array:
         """Return the unit vector of a rigid body or the ground that points along an axis at the start, (samples, 3)."""
-        return self._everywhere(self.value(direction(self._placement, body, axis)))
+        return self._everywhere(self.value(self._placement.axis(body, axis)))
 
     def common_axis(self, first: Attachment, second: Attachment, axis: Any) -> Array:
         """Return an axis that two bodies have in common, as the rigid one has it, or else a section, (samples, 3)."""

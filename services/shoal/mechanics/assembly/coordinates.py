@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
+from shoal.errors import InputError
 from shoal.mechanics import plane
 from shoal.mechanics.affine import Affine, fixed
-from shoal.mechanics.assembly.groups import JointPoint, place_of
+from shoal.mechanics.assembly.groups import JointPoint, is_stiff, kept_rotation, place_of
 from shoal.mechanics.assembly.pose import Pose
 from shoal.mechanics.assembly.terms import Terms
-from shoal.mechanics.frames import Frame
-from shoal.mechanics.joints import Along, Apart, Meet
+from shoal.mechanics.frames import BeamFrame, Frame
+from shoal.mechanics.joints import Along, Apart, Geared, InPlane, Meet, Turned
 from shoal.mechanics.numerics.tile import Array, Flags, Number
-from shoal.scene import GROUND, Attachment, Scene
+from shoal.mechanics.reach import span
+from shoal.scene import GROUND, Attachment, Function, Scene
+
+NO_LENGTH = 1e-9
+"""A distance that is none, as a part of the machine's size."""
 
 
 @dataclass
@@ -69,9 +75,67 @@ class Placement:
             return fixed(np.eye(scene.dimensions)[0][:, None])
         return self.frames[at.body].direction(scene.location(at))
 
-    def gap(self, scene: Scene, condition: Along | Apart | Meet) -> Affine:
+    def gap(self, scene: Scene, condition: Along | Apart | Meet | InPlane) -> Affine:
         """The way from the first place of a condition to the second."""
         return self.point(scene, condition.second) - self.point(scene, condition.first)
+
+    def across(self, first: Attachment, direction: Any) -> list[tuple[Affine, Array]]:
+        """Return vectors u and forms F with u' F w = 0 for w along a line that a body holds: one pair, in space two.
+
+        direction: of the line in the body's frame [rad]; in space also an axis as it points at the start.
+        """
+        return [(self.direction(self.scene, first).turned(plane.rotation(direction)), plane.CROSS)]
+
+    def shares(self, condition: Any, is_weld: bool) -> bool:
+        """Return whether the coordinates satisfy a condition by themselves, or further terms hold it.
+
+        is_weld: whether it is the angle of two places that coincide
+        """
+        if isinstance(condition, Meet):
+            return not (condition.within or condition.held)
+        if isinstance(condition, Turned):
+            stiff = all(is_stiff(self.scene, side.body) for side in (condition.first, condition.second))
+            return not condition.driven and (stiff or (is_weld and self._is_clamp(condition)))
+        return isinstance(condition, Along) and condition.is_fixed
+
+    def _is_clamp(self, weld: Turned) -> bool:
+        """Return whether a weld of a rod is to the ground at a node, where the slope has one unknown only."""
+        sides = {side.body: side for side in (weld.first, weld.second)}
+        if GROUND not in sides:
+            return False
+        side = next(side for body, side in sides.items() if body != GROUND)
+        frame = self.frames[side.body]
+        return isinstance(frame, BeamFrame) and frame.node(self.scene.location(side)) is not None
+
+    def keep_distance(self, name: str, gap: Affine, length: Function | None) -> None:
+        """Require the length of a vector [m]; None: that of the start. Raises InputError if that is zero."""
+        if length is not None:
+            self.terms.dot(name, gap, gap, 2, drive=length.through("square", "neg"))
+            return
+        square = sum(self.start_of(gap)[0] ** 2)
+        if np.any(square < (NO_LENGTH * span(self.scene)) ** 2):
+            raise InputError(
+                f"joints.{name}.length: not stated, so it is that of the start, 0 m, which has no direction; "
+                "let the two places start apart, state the length, or join them by a revolute joint"
+            )
+        self.terms.dot(name, gap, gap, 2, -square)
+
+    def keep_angle(self, name: str, condition: Turned) -> None:
+        """Require an angle: by its cosine and sine if it is driven, else of slopes that may stretch, by its sine."""
+        first, second = (self.direction(self.scene, side) for side in (condition.first, condition.second))
+        if isinstance(condition.angle, Function):
+            self.terms.dot(name, first, second, 0, drive=condition.angle.through("cos", "neg"))
+            self.terms.cross(name, first, second, 0, condition.angle.through("sin", "neg"))
+        else:
+            self.terms.cross(name, first.turned(kept_rotation(self.scene, condition)), second, 0)
+
+    def keep_mesh(self, name: str, condition: Geared) -> None:
+        """Require the weighted sum of angles that the start has, but for whole teeth."""
+        directions = [self.direction(self.scene, side) for side in condition.sides]
+        starts = [plane.angle(self.start_of(one)[0]) for one in directions]
+        begin = sum(factor * angle for factor, angle in zip(condition.factors, starts, strict=True))
+        parts = tuple((factor, one) for factor, one in zip(condition.factors, directions, strict=True) if factor)
+        self.terms.mesh(name, parts, -begin, 2 * np.pi / condition.most)
 
     def make(self, point: JointPoint, position: Array, velocity: Array) -> Affine:
         """The coordinates of a joint point that has none yet."""

@@ -18,7 +18,6 @@ from shoal.mechanics.assembly.rods import rod_axis
 from shoal.mechanics.assembly.rows import Rows
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
 from shoal.mechanics.assembly.space.hinges import axis_of, turning
-from shoal.mechanics.assembly.space.holding import line_of
 from shoal.mechanics.forces import ANGLE, DISTANCE, PLACE, Forces
 from shoal.mechanics.frames import BeamFrame, ModalFrame, RigidFrame
 from shoal.mechanics.functions import Piecewise
@@ -108,7 +107,7 @@ class Loads:
             self._angle(name, joint.first, joint.second, law, joint.axis)
             return
         if isinstance(self.placement, SpatialPlacement):
-            line = line_of(self.placement, joint.first.body, joint.direction if joint.axis is None else joint.axis)
+            line = self.placement.line(joint.first.body, joint.direction if joint.axis is None else joint.axis)
         else:
             line = self.placement.direction(self.scene, joint.first).turned(plane.rotation(joint.direction))
         ends = [self.placement.point(self.scene, side) for side in (joint.first, joint.second)]

@@ -92,7 +92,7 @@ class Assembly:
         arms = np.array([max(float(np.max(arm)), 1e-3 * self.size) for arm in extents(scene).values()])
         self.give = np.stack([np.ones_like(arms), np.ones_like(arms), arms**-2], 1).ravel()
         """Inverse of the metric in which displacements are measured, (3 bodies,)."""
-        self.closure = Closure(scene, self.guess)
+        self.closure = self.closure.at(self.guess)
         self._sought: dict[tuple[bytes, bytes], Placed] = {}
         """What was looked for before: where it is not there, the reason is sought by the same steps."""
         self.effort = 0
@@ -105,7 +105,7 @@ class Assembly:
             rng = np.random.default_rng(attempt)
             shaken = min(0.3 * attempt, np.pi) * rng.uniform(-1.0, 1.0, angles.shape[1])
             angles = np.where(keep, angles, angles + shaken)
-        return self.walk.poses(self.closure, angles, self.rates)[0]
+        return self.walk.poses(angles, self.rates)[0]
 
     def held(self, chosen: list[Statement]) -> tuple[Flags, Array]:
         """Which poses these statements fix, and their values; each (lanes, 3 bodies)."""
@@ -136,7 +136,7 @@ class Assembly:
         fixed, values = self.held(chosen)
         begin = np.concatenate([self._guess(number, fixed[:, 2::3]) for number in range(FEWER)])
         for own in (True, False) if self._own else (True,):
-            closure = Closure(self.scene, np.where(fixed, values, self.guess), own)
+            closure = self.closure.at(np.where(fixed, values, self.guess), own)
             rows = closure.rows(self.close(closure, np.where(fixed, values, begin), fixed, most=ITERATIONS // 2)[0])
             gap = np.abs(rows.gap / np.where(rows.angular, 1.0, self.size))[:, np.isin(rows.names, joints)]
             if np.any(np.max(gap, axis=1, initial=0.0) <= CLOSED):
@@ -150,7 +150,7 @@ class Assembly:
     def _seek(self, fixed: Flags, values: Array, near: Array | None, most: int) -> Placed:
         best, ok = np.where(fixed, values, self.guess), np.zeros(self.lanes, dtype=bool)
         for own in (True, False) if self._own else (True,):
-            closure = Closure(self.scene, np.where(fixed, values, self.guess), own)
+            closure = self.closure.at(np.where(fixed, values, self.guess), own)
             for attempt in range(most):
                 if attempt == 1 and self.lanes == 1:
                     # The later guesses at once, as lanes: they take as long as two, and the first that closes is taken.
@@ -172,7 +172,7 @@ class Assembly:
         fixed, values = self.held([one for one in self.statements if one.firm])
         known, first = [poses], np.where(fixed, values, self.guess)
         shaken = [self._guess(attempt, fixed[:, 2::3]) for attempt in range(1, ATTEMPTS)]
-        found, gap = self.close(Closure(self.scene, first), np.where(fixed, values, np.concatenate(shaken)), fixed)
+        found, gap = self.close(self.closure.at(first), np.where(fixed, values, np.concatenate(shaken)), fixed)
         for closed in np.flatnonzero(gap <= CLOSED):
             other = found[[closed]]
             # Turns of a body are one pose.
@@ -270,14 +270,14 @@ class Assembly:
             self._free(one, u, kept) | (np.abs(u[:, one.columns] - one.values) < CLOSED)
         ):
             return u, kept
-        closure = Closure(self.scene, np.where(more, values, u), own=False)
+        closure = self.closure.at(np.where(more, values, u), own=False)
         found, gap = self.close(closure, np.where(more, values, u), more)
         better = trying & (gap <= CLOSED)
         return np.where(better[:, None], found, u), np.where(better[:, None], more, kept)
 
     def _free(self, one: Statement, u: Array, kept: Flags) -> Flags:
         """Return whether the joints and what is kept leave the columns of a statement free, (lanes, columns)."""
-        slope = Closure(self.scene, u, own=False).rows(u).slope * np.sqrt(np.where(kept, 0.0, self.give))[:, None, :]
+        slope = self.closure.at(u, own=False).rows(u).slope * np.sqrt(np.where(kept, 0.0, self.give))[:, None, :]
         basis = np.linalg.svd(slope, full_matrices=False)
         rank = DEPENDENT * np.max(basis.S, axis=1, initial=1e-300, keepdims=True) < basis.S
         told = np.einsum("lri,lr->li", basis.Vh**2, rank.astype(float))

@@ -7,7 +7,7 @@ singular position the second derivative of the joints must vanish along the moti
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,7 +17,6 @@ from shoal.mechanics.start.closure import Closure
 from shoal.mechanics.start.poses import ROUNDING, Assembly, Statement, stated
 from shoal.scene import PointMass, Scene
 from shoal.scene.joints import Tie
-from shoal.scene.record import Record
 
 SINGULAR = 1e-6
 """Part of a row, of its own length, below which it depends on others."""
@@ -43,14 +42,14 @@ class Velocities:
 
     def __init__(self, assembly: Assembly, poses: Array) -> None:
         self.scene, self.lanes, self.poses = assembly.scene, assembly.lanes, poses
-        self.closure = Closure(assembly.scene, poses)
+        self.closure = assembly.closure.at(poses)
         self.rows = self.closure.rows(poses)
         # What closes a rod upon itself asks nothing of its rates; its rows are round-off.
         joints = assembly.scene.joints.items()
         self.rings = {name for name, j in joints if isinstance(j, Tie) and j.first.body == j.second.body}
         self.statements = stated(assembly.scene, assembly.lanes, ("rate", "velocity"))
         self.size, self.walk = assembly.size, assembly.walk
-        self.guess = assembly.walk.poses(self.closure, poses[:, 2::3], assembly.rates)[1]
+        self.guess = assembly.walk.poses(poses[:, 2::3], assembly.rates)[1]
         self.flexible = any(body.element != "rigid" for body in self.scene.bodies.values())
         largest = [np.max(np.abs(one.values), initial=0.0) * self._unit(one) for one in self.statements]
         fastest = max([*largest, float(np.max(np.abs(self.rows.rate), initial=0.0)), float(np.max(np.abs(self.guess)))])
@@ -113,8 +112,7 @@ class Velocities:
             left = np.linalg.svd(slope / (np.linalg.norm(slope, axis=1, keepdims=True) + 1e-300))
             rank = int(np.sum(left.S > SINGULAR))
             null = left.U[:, rank:].T / (np.linalg.norm(slope, axis=1) + 1e-300)
-            closure = Closure(_of_lane(self.scene, int(lane)), self.poses[lane : lane + 1], self.closure.own)
-            bend = _Bend(closure, self.poses[lane], null, keep, units)
+            bend = _Bend(self.closure.of_lane(int(lane)), self.poses[lane], null, keep, units)
             free = basis.rest(int(lane))
             found = bend.nearest(rates[lane], free, self.speed / self.size)
             ok[lane] = found is not None
@@ -140,9 +138,7 @@ class _Bend(NamedTuple):
         step = 1e-4 / max(float(np.max(np.abs(v / self.units))), 1e-300)
         shifts = step * np.array([-2.0, -1.0, 1.0, 2.0])
         u = self.poses + shifts[:, None] * v
-        own = self.closure
-        begin = np.broadcast_to(self.poses, u.shape)
-        slopes = Closure(own.scene, begin, own.own).rows(u).slope[:, self.keep] @ v
+        slopes = self.closure.rows(u).slope[:, self.keep] @ v
         return np.asarray(self.null @ (np.array([1.0, -8.0, 8.0, -1.0]) @ slopes / (12 * step)))
 
     def nearest(self, v: Array, free: Array, scale: float) -> Array | None:
@@ -212,17 +208,6 @@ class _Basis:
         split = np.linalg.svd(self.rows[lane])
         rank = int(np.sum(split.S > 0.5))
         return np.asarray(split.Vh[rank:] @ self.inverse[lane])
-
-
-def _of_lane(part: Any, lane: int) -> Any:
-    """A scene, or a part of one, with the numbers of one lane."""
-    if isinstance(part, np.ndarray):
-        return float(part[lane])
-    if isinstance(part, Record):
-        return part.model_copy(update={n: _of_lane(getattr(part, n), lane) for n in type(part).model_fields})
-    if isinstance(part, dict):
-        return {key: _of_lane(value, lane) for key, value in part.items()}
-    return tuple(_of_lane(value, lane) for value in part) if type(part) is tuple else part
 
 
 def _metric(scene: Scene, poses: Array, size: float) -> Array:

@@ -8,7 +8,7 @@ import numpy as np
 
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.plane import as_complex, phasor
-from shoal.mechanics.start.closure import Closure, lead, place_of
+from shoal.mechanics.start.closure import lead, place_of
 from shoal.mechanics.start.poses import Assembly
 from shoal.scene import GROUND, Attachment, Coupling, InitialState, RigidBody, Scene
 from shoal.scene.joints import Joint
@@ -31,7 +31,7 @@ def redundant_joints(scene: Scene) -> tuple[str, ...]:
     if names and len(free):
         step = free.T @ np.cos(1.0 + np.arange(len(free)))
         aside = assembly.guess + _ASIDE * step / np.max(np.abs(step))
-        poses, gap = assembly.close(Closure(scene, assembly.guess), aside, np.zeros(aside.shape, dtype=bool))
+        poses, gap = assembly.close(assembly.closure, aside, np.zeros(aside.shape, dtype=bool))
         # A machine that comes back cannot move: what holds it twice does so for good.
         if gap[0] < 1e-9 and np.max(np.abs(poses - assembly.guess)) > 0.25 * _ASIDE:
             names = _dependent(assembly, poses)[0]
@@ -40,7 +40,7 @@ def redundant_joints(scene: Scene) -> tuple[str, ...]:
 
 def _dependent(assembly: Assembly, poses: Array) -> tuple[tuple[str, ...], Array]:
     """Joints whose rows depend on others, and the motions that the rows leave free, (motions, 3 bodies)."""
-    rows = Closure(assembly.scene, poses).rows(poses)
+    rows = assembly.closure.at(poses).rows(poses)
     unit_size = np.where(np.arange(poses.shape[1]) % 3 == 2, 1.0 / assembly.size, 1.0)
     slope = rows.slope[0] * unit_size
     slope = slope / (np.linalg.norm(slope, axis=1, keepdims=True) + 1e-300)

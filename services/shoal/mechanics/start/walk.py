@@ -7,14 +7,18 @@ from collections.abc import Iterator
 import numpy as np
 
 from shoal.errors import InputError
-from shoal.mechanics.joints import Along, Apart, Geared, Meet, Sum, Turned, of_scene, unknown
+from shoal.mechanics.joints import Along, Apart, Geared, JointCondition, Meet, Turned, of_scene, unknown
 from shoal.mechanics.numerics.tile import Array, Number
 from shoal.mechanics.plane import as_complex, phasor
-from shoal.mechanics.start.closure import Closure, lead, place_of, rate_of, value_of
+from shoal.mechanics.start.closure import bending_rate, lead, place_of, rate_of, value_of
 from shoal.scene import GROUND, Attachment, Function, Scene
 
 Step = tuple[str, Attachment | None, Attachment | None, Number]
 """A body, the known attachment it hangs on, its own attachment there, and how far apart they are [m]."""
+
+
+_TWO_SIDED = (Meet, Along, Apart, Turned)
+_USUAL = (*_TWO_SIDED, Geared)
 
 
 class Walk:
@@ -39,7 +43,7 @@ class Walk:
                         return name, None, None, 0.0
                 continue
             for _, condition in of_scene(self.scene):
-                if not isinstance(condition, Meet | Along | Apart | Turned | Geared | Sum):
+                if not isinstance(condition, JointCondition):
                     raise unknown(condition)
                 if not isinstance(condition, Meet | Along | Apart) or not isinstance(condition, kind):
                     continue
@@ -49,10 +53,29 @@ class Walk:
                             return there.body, here, there, 0.0
                         if condition.length is not None:
                             return there.body, here, there, value_of(condition.length)
-        if any(isinstance(condition, Sum) for _, condition in of_scene(self.scene)):
+        # Any other condition than these may tell it.
+        if any(not isinstance(condition, _USUAL) for _, condition in of_scene(self.scene)):
             return next(iter(waiting)), None, None, 0.0
         name = next(iter(waiting))
         raise InputError(f"initial.{name}.position: say where {name} starts; no joint point tells it")
+
+    def _moving(self, at: Attachment, u: Array, v: Array, column: dict[str, int]) -> tuple[Number, Number]:
+        """Place x + iy [m] and velocity [m/s] of an attachment."""
+        if at.body == GROUND and isinstance(at.point, str):
+            path = self.scene.ground_points[at.point]
+            place, speed = (part(path.x) + 1j * part(path.y) for part in (value_of, rate_of))
+            return place, speed
+        if at.body == GROUND:
+            return as_complex(at.point), 0.0
+        x, y, turn = range(column[at.body], column[at.body] + 3)
+        arm, turning = self._arm(at, u[:, turn], v[:, turn])
+        return u[:, x] + 1j * u[:, y] + arm, v[:, x] + 1j * v[:, y] + turning
+
+    def _arm(self, at: Attachment, angle: Array, rate: Array) -> tuple[Array, Array]:
+        """The way x + iy [m] from a body's origin to an attachment, and its rate."""
+        axis = phasor(angle)
+        arm = axis * place_of(self.scene, at)
+        return arm, 1j * rate * arm + axis * bending_rate(self.scene, at)
 
     @property
     def closing(self) -> list[str]:
@@ -61,26 +84,25 @@ class Walk:
         needed = {
             name
             for name, condition in of_scene(self.scene)
-            if not isinstance(condition, Sum | Geared)
+            if isinstance(condition, _TWO_SIDED)
             and any((id(here), id(there)) in used for here, there in _both_ways(condition))
         }
         return [name for name in self.scene.joints if name not in needed]
 
-    def poses(self, closure: Closure, angles: Array, rates: Array) -> tuple[Array, Array]:
+    def poses(self, angles: Array, rates: Array) -> tuple[Array, Array]:
         """Poses and their rates for angles [rad] and rates [rad/s] of all bodies, each (lanes, bodies)."""
         u, v = np.zeros((2, len(angles), 3 * len(self.scene.bodies)))
         u[:, 2::3], v[:, 2::3] = angles, rates
+        column = {name: 3 * number for number, name in enumerate(self.scene.bodies)}
         for name, here, there, away in self.steps:
-            k = closure.column[name]
+            k = column[name]
             if here is None or there is None:
                 start = self.scene.start(name)
                 position, speed = as_complex(start.position or (0.0, 0.0)), as_complex(start.velocity)
             else:
-                at = closure.here(u, here)
-                arm = phasor(u[:, k + 2]) * place_of(self.scene, there)
-                position = at.value + away - arm
-                bending = phasor(u[:, k + 2]) * closure.bending_rate(there)
-                speed = closure.speed(at, v, here) - 1j * v[:, k + 2] * arm - bending
+                place, speed = self._moving(here, u, v, column)
+                arm, turning = self._arm(there, u[:, k + 2], v[:, k + 2])
+                position, speed = place + away - arm, speed - turning
             u[:, k], u[:, k + 1] = np.real(position), np.imag(position)
             v[:, k], v[:, k + 1] = np.real(speed), np.imag(speed)
         return u, v

@@ -9,7 +9,6 @@ from shoal.mechanics import rotation as turns
 from shoal.mechanics.affine import Affine
 from shoal.mechanics.assembly.groups import is_stiff
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
-from shoal.mechanics.assembly.space.holding import hinge
 from shoal.mechanics.assembly.space.section_axes import along, field_of, unit
 from shoal.mechanics.assembly.space.sections import image
 from shoal.mechanics.frames import BeamFrame
@@ -48,7 +47,7 @@ def turning(
     has.
     """
     if all(is_stiff(scene, side.body) for side in (first, second)):
-        return hinge(scene, result, first, second, axis)
+        return result.hinge(first, second, axis)
     if not _has_section(scene, result, first):
         if not _has_section(scene, result, second):
             raise InputError(

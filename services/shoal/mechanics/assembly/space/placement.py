@@ -19,12 +19,12 @@ from shoal.mechanics import joints, reach
 from shoal.mechanics import rotation as turns
 from shoal.mechanics.affine import Affine, combined, fixed
 from shoal.mechanics.assembly.groups import JointPoint, is_stiff, rotated, transposed
+from shoal.mechanics.assembly.holding import hold
 from shoal.mechanics.assembly.order import next_body, place_driver
 from shoal.mechanics.assembly.pose import Pose, arm
 from shoal.mechanics.assembly.space.axes import JointAxis
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
 from shoal.mechanics.assembly.space.hinges import make_axes
-from shoal.mechanics.assembly.space.holding import hold, rests
 from shoal.mechanics.assembly.space.rod_joints import hold_rod
 from shoal.mechanics.assembly.space.rods import place_rod
 from shoal.mechanics.assembly.space.sections import material
@@ -174,7 +174,7 @@ class _Rigid:
         axis.holders.add(name)
         onto = normal[:, None] * normal[None]
         quarter = turns.skew(normal)
-        level = rests(self.where.turned(onto))
+        level = self.where.turned(onto).rests
         for point in sorted(others, key=lambda point: point.where is None):
             away = self._away(point)
             height = np.sum(away * image, axis=0)
@@ -194,7 +194,7 @@ class _Rigid:
                 point.where = point.where + result.new_along(0.0 * other, other, rest, speed)
             gap = point.where - self.where
             risen = gap.turned(onto)
-            if not rests(risen):
+            if not risen.rests:
                 result.terms.dot(name, fixed(normal), gap, 1, -height)
             result.chosen.add((name, id(point)))
             first_image = flat / width

@@ -14,7 +14,6 @@ from shoal.mechanics import rotation as turns
 from shoal.mechanics.affine import Affine, combined
 from shoal.mechanics.assembly.groups import is_stiff
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
-from shoal.mechanics.assembly.space.holding import of_image
 from shoal.mechanics.assembly.space.sections import ALIGNED
 from shoal.mechanics.assembly.space.strained import section_at
 from shoal.mechanics.frames import BeamFrame
@@ -55,7 +54,7 @@ def along(scene: Scene, name: str, result: SpatialPlacement, side: Attachment, i
 def unit(scene: Scene, name: str, result: SpatialPlacement, side: Attachment, image: Array) -> Affine:
     """The unit vector that the frame of a body, or of a rod's section at a place, has so. Raises InputError."""
     if is_stiff(scene, side.body):
-        return of_image(result, side.body, image)
+        return result.of_image(side.body, image)
     found = director_of(scene, name, result, side)
     if found is None:
         raise InputError(

@@ -1,0 +1,112 @@
+"""Values and Jacobian of constraint terms at time zero, at many coordinates at once, in the plane and in space.
+
+Arrays lead with the lanes: coordinates q are (lanes, unknowns), values (lanes, terms).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from copy import copy
+from itertools import pairwise
+
+import numpy as np
+
+from shoal.mechanics.affine import Affine
+from shoal.mechanics.assembly.terms import Mesh, Term
+from shoal.mechanics.fitting import start_slope, start_value
+from shoal.mechanics.numerics.tile import Array, Index
+
+
+class TermValues:
+    """Terms as arrays. roots: numbers of the terms u' u of which the root is asked for, a length."""
+
+    def __init__(self, terms: Sequence[Term | Mesh], dimensions: int, roots: Sequence[int] = ()) -> None:
+        self.count = len(terms)
+        products = [(row, one) for row, one in enumerate(terms) if isinstance(one, Term)]
+        angles = [(row, *part) for row, one in enumerate(terms) if isinstance(one, Mesh) for part in one.parts]
+        vectors = [(row, vector) for name in "uw" for row, one in products for vector in (getattr(one, name),)]
+        vectors += [(row, vector) for row, _, vector in angles]
+        self._products, self._angles = _index([row for row, _ in products]), _index([row for row, *_ in angles])
+        self._factors = np.array([factor for _, factor, _ in angles])
+        self._form = np.array([one.form for _, one in products]).reshape(-1, dimensions, dimensions)
+        self._roots = np.isin(self._products, _index(roots))
+        self._constant = laned([vector.constant.T for _, vector in vectors], (dimensions,))
+        drives = [0.0 if one.drive is None else start_value(one.drive) for one in terms]
+        constants = [np.atleast_1d(one.constant + drive) for one, drive in zip(terms, drives, strict=True)]
+        self._offset = laned(constants, ())
+        self.drift = np.array([0.0 if one.drive is None else start_slope(one.drive) for one in terms])
+        """Derivatives of the terms by time at coordinates that rest, (terms,)."""
+        self.rows, self._numbers, self.unknowns, self._coefficients, self.groups = _links(vectors, dimensions)
+        """Of every part of the Jacobian its term and unknown; groups: of parts no two of which are of the same term."""
+
+    def of_lane(self, lane: int) -> TermValues:
+        """Return the terms of one lane."""
+        other = copy(self)
+        for name in ("_constant", "_offset", "_coefficients"):
+            setattr(other, name, one_lane(getattr(self, name), lane))
+        return other
+
+    def at(self, q: Array) -> tuple[Array, Array]:
+        """Return the values, and the parts of the Jacobian, (lanes, parts), which add up."""
+        count, lanes = len(self._products), max(len(q), len(self._constant), len(self._offset))
+        vectors = np.repeat(self._constant, lanes // len(self._constant), axis=0)
+        steps = self._coefficients * q[:, self.unknowns, None]
+        for part in self.groups:
+            vectors[:, self._numbers[part]] += steps[:, part]
+        u, w, turned = vectors[:, :count], vectors[:, count : 2 * count], vectors[:, 2 * count :]
+        by_u, by_w = (self._form @ w[..., None])[..., 0], (self._form.swapaxes(1, 2) @ u[..., None])[..., 0]
+        found = np.sum(u * by_u, axis=2)
+        if np.any(self._roots):
+            length = np.sqrt(found[:, self._roots])
+            found[:, self._roots] = length
+            axis = np.eye(u.shape[2])[0]  # of places that coincide
+            safe = np.where(length > 0, length, 1.0)[..., None]
+            by_u[:, self._roots] = np.where(length[..., None] > 0, u[:, self._roots] / safe, axis)
+            by_w[:, self._roots] = 0.0
+        values = np.zeros((lanes, self.count))
+        values[:, self._products] = found
+        x, y = turned[..., 0], turned[..., 1]
+        by_turned = np.zeros_like(turned)
+        if len(self._angles):
+            np.add.at(values, (slice(None), self._angles), self._factors * np.arctan2(y, x))
+            by_turned[..., 0], by_turned[..., 1] = self._factors * np.stack([-y, x]) / (x * x + y * y)
+        by_vector = np.concatenate([by_u, by_w, by_turned], axis=1)
+        return values + self._offset, np.sum(by_vector[:, self._numbers] * self._coefficients, axis=2)
+
+    def jacobian(self, q: Array) -> Array:
+        """Return the derivatives by all unknowns, (lanes, terms, unknowns)."""
+        values, slopes = self.at(q)
+        dense = np.zeros((*values.shape, q.shape[1]))
+        for part in self.groups:
+            dense[:, self.rows[part], self.unknowns[part]] += slopes[:, part]
+        return dense
+
+
+def _links(vectors: list[tuple[int, Affine]], dimensions: int) -> tuple[Index, Index, Index, Array, list[slice]]:
+    """Rows, numbers of the vectors, unknowns and coefficients of vectors that are of a row each, and groups of them."""
+    of_row: dict[int, list[tuple[int, int, Array]]] = {}
+    for number, (row, vector) in enumerate(vectors):
+        of_row.setdefault(row, []).extend((number, unknown, c.T) for unknown, c in vector.terms.items())
+    groups = [[(row, *links[k]) for row, links in of_row.items() if len(links) > k]
+              for k in range(max(map(len, of_row.values()), default=0))]  # fmt: skip
+    ends = np.cumsum([0, *map(len, groups)])
+    every = [part for group in groups for part in group]
+    rows, numbers, unknowns = (_index([part[k] for part in every]) for k in range(3))
+    parts = [slice(*pair) for pair in pairwise(ends)]
+    return rows, numbers, unknowns, laned([part[3] for part in every], (dimensions,)), parts
+
+
+def _index(numbers: Sequence[int]) -> Index:
+    return np.array(numbers, dtype=np.int64)
+
+
+def laned(parts: Sequence[Array], shape: tuple[int, ...]) -> Array:
+    """Arrays that lead with the lanes, or with 1, one after the other, (lanes or 1, parts, *shape)."""
+    lanes = max((len(part) for part in parts), default=1)
+    each = [part if len(part) == lanes else np.repeat(part, lanes, axis=0) for part in parts]
+    return np.array(each, dtype=float).reshape(-1, lanes, *shape).swapaxes(0, 1)
+
+
+def one_lane(values: Array, lane: int) -> Array:
+    """Values of a lane, (1, ...), of those of all or of one for all."""
+    return values[lane : lane + 1] if len(values) > 1 else values
