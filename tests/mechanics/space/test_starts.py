@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from shoal.errors import InputError
 from shoal.mechanics.assembly.space import start
-from shoal.mechanics.assembly.space.values import jacobian
+from shoal.mechanics.assembly.term_values import TermValues
 from shoal.mechanics.simulate import simulate
 from shoal.scene import Scene
 from shoal.trajectory import Status
@@ -185,13 +185,13 @@ def test_a_loop_that_no_poses_close_is_given_up_early(monkeypatch: pytest.Monkey
         "markers": {"A": {"body": "a", "point": "end"}},
         "solver": {"duration": 1.0},
     }
-    asked = list[int]()
+    asked, at = list[int](), TermValues.at
 
     def counted(*arguments: Any) -> Any:
         asked.append(1)
-        return jacobian(*arguments)
+        return at(*arguments)
 
-    monkeypatch.setattr(start, "jacobian", counted)
+    monkeypatch.setattr(TermValues, "at", counted)
     with pytest.raises(InputError, match="cannot be assembled; no poses near the stated ones close it"):
         start.place_started(Scene.parse(scene, "too short"))
     assert len(asked) < 17 * 30

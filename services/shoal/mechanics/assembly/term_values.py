@@ -5,6 +5,7 @@ Arrays lead with the lanes: coordinates q are (lanes, unknowns), values (lanes, 
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from copy import copy
 from itertools import pairwise
@@ -26,14 +27,17 @@ class TermValues:
         angles = [(row, *part) for row, one in enumerate(terms) if isinstance(one, Mesh) for part in one.parts]
         vectors = [(row, vector) for name in "uw" for row, one in products for vector in (getattr(one, name),)]
         vectors += [(row, vector) for row, _, vector in angles]
-        self._products, self._angles = _index([row for row, _ in products]), _index([row for row, *_ in angles])
-        self._factors = np.array([factor for _, factor, _ in angles])
+        self._products = _index([row for row, _ in products])
+        self._factors = np.zeros((len(angles), len(terms)))  # of angles in the terms
+        for factors, (row, factor, _) in zip(self._factors, angles, strict=True):
+            factors[row] = factor
         self._form = np.array([one.form for _, one in products]).reshape(-1, dimensions, dimensions)
         self._roots = np.isin(self._products, _index(roots))
         self._constant = laned([vector.constant.T for _, vector in vectors], (dimensions,))
         drives = [0.0 if one.drive is None else start_value(one.drive) for one in terms]
         constants = [np.atleast_1d(one.constant + drive) for one, drive in zip(terms, drives, strict=True)]
-        self._offset = laned(constants, ())
+        self.offset = laned(constants, ())
+        """Constants of the terms with their functions at time zero, (lanes or 1, terms)."""
         self.drift = np.array([0.0 if one.drive is None else start_slope(one.drive) for one in terms])
         """Derivatives of the terms by time at coordinates that rest, (terms,)."""
         self.rows, self._numbers, self.unknowns, self._coefficients, self.groups = _links(vectors, dimensions)
@@ -42,13 +46,14 @@ class TermValues:
     def of_lane(self, lane: int) -> TermValues:
         """Return the terms of one lane."""
         other = copy(self)
-        for name in ("_constant", "_offset", "_coefficients"):
+        for name in ("_constant", "offset", "_coefficients"):
             setattr(other, name, one_lane(getattr(self, name), lane))
         return other
 
     def at(self, q: Array) -> tuple[Array, Array]:
         """Return the values, and the parts of the Jacobian, (lanes, parts), which add up."""
-        count, lanes = len(self._products), max(len(q), len(self._constant), len(self._offset))
+        count = len(self._products)
+        lanes = max(len(q), len(self._constant), len(self.offset), len(self._coefficients))
         vectors = np.repeat(self._constant, lanes // len(self._constant), axis=0)
         steps = self._coefficients * q[:, self.unknowns, None]
         for part in self.groups:
@@ -65,18 +70,21 @@ class TermValues:
             by_w[:, self._roots] = 0.0
         values = np.zeros((lanes, self.count))
         values[:, self._products] = found
-        x, y = turned[..., 0], turned[..., 1]
         by_turned = np.zeros_like(turned)
-        if len(self._angles):
-            np.add.at(values, (slice(None), self._angles), self._factors * np.arctan2(y, x))
-            by_turned[..., 0], by_turned[..., 1] = self._factors * np.stack([-y, x]) / (x * x + y * y)
+        if len(self._factors):
+            x, y = turned[..., 0], turned[..., 1]
+            values = values + np.arctan2(y, x) @ self._factors
+            by_turned[..., 0], by_turned[..., 1] = np.sum(self._factors, axis=1) * np.stack([-y, x]) / (x * x + y * y)
         by_vector = np.concatenate([by_u, by_w, by_turned], axis=1)
-        return values + self._offset, np.sum(by_vector[:, self._numbers] * self._coefficients, axis=2)
+        return values + self.offset, np.sum(by_vector[:, self._numbers] * self._coefficients, axis=2)
 
     def jacobian(self, q: Array) -> Array:
         """Return the derivatives by all unknowns, (lanes, terms, unknowns)."""
-        values, slopes = self.at(q)
-        dense = np.zeros((*values.shape, q.shape[1]))
+        return self.dense(self.at(q)[1], q.shape[1])
+
+    def dense(self, slopes: Array, unknowns: int) -> Array:
+        """Return the Jacobian of which these are the parts."""
+        dense = np.zeros((len(slopes), self.count, unknowns))
         for part in self.groups:
             dense[:, self.rows[part], self.unknowns[part]] += slopes[:, part]
         return dense
@@ -84,16 +92,18 @@ class TermValues:
 
 def _links(vectors: list[tuple[int, Affine]], dimensions: int) -> tuple[Index, Index, Index, Array, list[slice]]:
     """Rows, numbers of the vectors, unknowns and coefficients of vectors that are of a row each, and groups of them."""
-    of_row: dict[int, list[tuple[int, int, Array]]] = {}
-    for number, (row, vector) in enumerate(vectors):
-        of_row.setdefault(row, []).extend((number, unknown, c.T) for unknown, c in vector.terms.items())
-    groups = [[(row, *links[k]) for row, links in of_row.items() if len(links) > k]
-              for k in range(max(map(len, of_row.values()), default=0))]  # fmt: skip
-    ends = np.cumsum([0, *map(len, groups)])
-    every = [part for group in groups for part in group]
-    rows, numbers, unknowns = (_index([part[k] for part in every]) for k in range(3))
-    parts = [slice(*pair) for pair in pairwise(ends)]
-    return rows, numbers, unknowns, laned([part[3] for part in every], (dimensions,)), parts
+    parts = [(row, number, unknown) for number, (row, vector) in enumerate(vectors) for unknown in vector.terms]
+    seen = Counter[int]()
+    ordinals = []
+    for row, *_ in parts:
+        ordinals.append(seen[row])
+        seen[row] += 1
+    order = np.argsort(ordinals, kind="stable")
+    rows, numbers, unknowns = np.array(parts, dtype=np.int64).reshape(-1, 3)[order].T
+    coefficients = [c.T for _, vector in vectors for c in vector.terms.values()]
+    ends = np.searchsorted(np.sort(ordinals), np.arange(max(seen.values(), default=0) + 1)).tolist()
+    each = laned([coefficients[k] for k in order], (dimensions,))
+    return rows, numbers, unknowns, each, [slice(*pair) for pair in pairwise(ends)]
 
 
 def _index(numbers: Sequence[int]) -> Index:

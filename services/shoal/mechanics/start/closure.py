@@ -56,7 +56,7 @@ class _Angles(NamedTuple):
     def driven(self) -> Function | None:
         """The function of time that the sum follows, if it does."""
         is_driven = isinstance(self.kept, Turned) and isinstance(self.kept.angle, Function)
-        return self.kept.angle if is_driven else None  # type: ignore[union-attr, return-value]
+        return self.kept.angle if is_driven else None  # type: ignore[union-attr]
 
 
 class RigidBodies:

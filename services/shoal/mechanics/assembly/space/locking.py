@@ -16,7 +16,8 @@ import numpy as np
 
 from shoal.errors import InputError
 from shoal.mechanics.assembly.space.redundancy import SHARE, joints_of
-from shoal.mechanics.assembly.space.values import jacobian, uncancelled, value_of
+from shoal.mechanics.assembly.space.values import uncancelled
+from shoal.mechanics.assembly.term_values import TermValues
 from shoal.mechanics.assembly.terms import Term
 from shoal.mechanics.numerics.tile import Array
 from shoal.scene import Scene
@@ -42,12 +43,13 @@ def require_unlocked(scene: Scene, terms: Sequence[Term], q: Array) -> None:
     if not terms or len(q) >= LARGEST:
         return
     length = np.array([uncancelled(term, q) for term in terms])
+    values = TermValues(terms, 3).of_lane(0)
 
     def gap(q: Array) -> Array:
-        return np.asarray([value_of(term, q, 0) for term in terms] / length)
+        return np.asarray(values.at(q[None])[0][0] / length)
 
     def slope(q: Array) -> Array:
-        return np.asarray(jacobian(terms, q, 0) / length[:, None])
+        return np.asarray(values.jacobian(q[None])[0] / length[:, None])
 
     if (found := lock(gap, slope, q)) is not None:
         first, *others = names = joints_of(scene, [terms[row].name for row in found.rows])

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from dataclasses import replace
+from collections.abc import Collection, Sequence
+from typing import Any
 
 import numpy as np
 
 from shoal.mechanics.assembly.space.placement import place_in_space
-from shoal.mechanics.assembly.space.values import slopes, value_of
+from shoal.mechanics.assembly.term_values import TermValues
 from shoal.mechanics.assembly.terms import Mesh, Term
 from shoal.mechanics.numerics.tile import Array
 from shoal.scene import Scene
 from shoal.scene.joints import places
 
-Row = tuple[str, list[tuple[int, float]]]
-"""Who holds it; unknowns and derivatives, those of an unknown add up."""
 DEPENDENT = 1e-7
 """Singular values of the rows of unit length below this are of rows that depend on others."""
 SHARE = 1e-3
@@ -31,9 +29,10 @@ def redundant(scene: Scene, q: Array) -> tuple[str, ...]:
     terms = place_in_space(scene).terms.held
     if not terms:
         return ()
-    rows = _rows(scene, terms, q)
-    share = _shares(rows, len(q))
-    return joints_of(scene, {name for (name, _), part in zip(rows, share, strict=True) if part > SHARE})
+    values = TermValues(terms, 3).of_lane(0)
+    names, combine = _combined(scene, terms, values, q)
+    share = _shares(values, combine, q)
+    return joints_of(scene, {name for name, part in zip(names, share, strict=True) if part > SHARE})
 
 
 def joints_of(scene: Scene, names: Collection[str]) -> tuple[str, ...]:
@@ -44,34 +43,40 @@ def joints_of(scene: Scene, names: Collection[str]) -> tuple[str, ...]:
     )
 
 
-def _rows(scene: Scene, terms: list[Term | Mesh], q: Array) -> list[Row]:
-    """The rows of the constraints at q. Of a driven angle, whose cosine and sine are held, that of the angle itself."""
-    found: list[Row] = []
-    driven: dict[str, list[Term]] = {}
-    for term in terms:
+def _combined(scene: Scene, terms: Sequence[Term | Mesh], values: TermValues, q: Array) -> tuple[list[str], Any]:
+    """Names of the rows, and the combinations of the terms that they are, (rows, terms).
+
+    The cosine and the sine of a driven angle make one row, that of the angle itself.
+    """
+    found = values.at(q[None])[0][0] - values.offset[0]
+    driven: dict[str, list[int]] = {}
+    names, rows = list[str](), list[dict[int, float]]()
+    for number, term in enumerate(terms):
         joint = scene.joints.get(term.name)
         if isinstance(term, Term) and joint is not None and joint.kind == "driven-angle" and term.drive is not None:
-            driven.setdefault(term.name, []).append(term)
+            driven.setdefault(term.name, []).append(number)
         else:
-            found.append((term.name, list(slopes(term, q[:, None], 0))))
+            names.append(term.name)
+            rows.append({number: 1.0})
     for name, (cosine, sine) in driven.items():
-        c, s = (value_of(replace(term, constant=0.0, drive=None), q, 0) for term in (cosine, sine))
-        parts = [(k, factor * x) for term, factor in ((cosine, -s), (sine, c)) for k, x in slopes(term, q[:, None], 0)]
-        found.append((name, parts))
-    return found
+        names.append(name)
+        rows.append({cosine: -found[sine], sine: found[cosine]})
+    import scipy.sparse
+
+    parts = [(row, number, factor) for row, one in enumerate(rows) for number, factor in one.items()]
+    each = [np.array(part) for part in zip(*parts, strict=True)]
+    return names, scipy.sparse.csr_array((each[2], (each[0], each[1])), shape=(len(rows), len(terms)))
 
 
-def _shares(found: list[Row], unknowns: int) -> Array:
+def _shares(values: TermValues, combine: Any, q: Array) -> Array:
     """The part of every row in all dependences, (rows,)."""
     import scipy.sparse
 
-    rows = np.repeat(np.arange(len(found)), [len(slopes_of_row) for _, slopes_of_row in found])
-    columns = np.array([unknown for _, slopes_of_row in found for unknown, _ in slopes_of_row], dtype=int)
-    values = np.array([value for _, slopes_of_row in found for _, value in slopes_of_row], dtype=float)
-    slope = scipy.sparse.csr_array((values, (rows, columns)), shape=(len(found), unknowns))
+    slopes = values.at(q[None])[1][0]
+    slope = combine @ scipy.sparse.csr_array((slopes, (values.rows, values.unknowns)), shape=(values.count, len(q)))
     length = np.sqrt(np.asarray((slope * slope).sum(axis=1)).ravel()) + 1e-300
     slope = scipy.sparse.diags_array(1 / length) @ slope
-    if len(found) > DENSE:
+    if slope.shape[0] > DENSE:
         vectors, sizes = _smallest(slope @ slope.T)
         if not np.all(sizes < DEPENDENT):
             return np.asarray(np.linalg.norm(vectors[:, sizes < DEPENDENT], axis=1))

@@ -19,16 +19,8 @@ from shoal.mechanics.affine import Affine
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
 from shoal.mechanics.assembly.space.locking import require_unlocked
 from shoal.mechanics.assembly.space.placement import place_in_space
-from shoal.mechanics.assembly.space.values import (
-    at,
-    drive_rate,
-    everywhere,
-    jacobian,
-    of_lane,
-    slopes,
-    value_of,
-    values_of,
-)
+from shoal.mechanics.assembly.space.values import at, of_lane
+from shoal.mechanics.assembly.term_values import TermValues
 from shoal.mechanics.assembly.terms import Mesh, Term
 from shoal.mechanics.frames import BeamFrame, Frame, PointFrame, RigidFrame
 from shoal.mechanics.numerics.tile import Array, stacked
@@ -103,10 +95,13 @@ def _leaves_free(held: Array, asked: Array) -> bool:
 
 
 class _Rates(NamedTuple):
-    """What rates have to meet: constraints, their scales, how they are driven, what is stated, and the pace."""
+    """Linear equations of the rates of one lane.
 
-    terms: list[Term | Mesh]
-    scale: Array
+    slope: Jacobian of the constraints, and driven: their derivatives by time, both by their scales; stated: rates;
+    pace: the largest rate
+    """
+
+    slope: Array
     driven: Array
     stated: list[_Stated]
     pace: float
@@ -119,11 +114,13 @@ class _Closing:
         self.scene, self.placement = scene, placement
         self.terms = [one for one in placement.terms.held if isinstance(one, Term)]
         self.meshes = [one for one in placement.terms.held if isinstance(one, Mesh)]
+        self.values = TermValues(self.terms, 3)
+        self.moving = TermValues([*self.terms, *self.meshes], 3)
         self.q, self.v = stacked(placement.positions), stacked(placement.velocities)
         self.size = float(reach.span(scene))
         self.gives_way = gives_way(scene)
         self.scale = np.array([self.size**term.lengths for term in self.terms])
-        lanes = max(self.q.shape[1], self.v.shape[1], *(len(np.atleast_1d(one)) for one in self.residual(self.q)), 1)
+        lanes = max(self.q.shape[1], self.v.shape[1], self.residual(self.q).shape[1])
         self.lanes = 0
         self._spread(lanes)
 
@@ -149,14 +146,12 @@ class _Closing:
             failed[moving] |= not self._move(int(moving))
         self.placement.positions, self.placement.velocities = list(self.q), list(self.v)
         held = self.placement.terms.held  # teeth mesh as the bodies start
-        held[:] = [one.begin(lambda u: everywhere(u, self.q)) if isinstance(one, Mesh) else one for one in held]
+        held[:] = [one.begin(lambda u: place_at(u, self.q)) if isinstance(one, Mesh) else one for one in held]
         self.placement.failed = failed
 
     def residual(self, q: Array) -> Array:
         """The constraints at time zero, (constraints, lanes)."""
-        found = [values_of(term, q) for term in self.terms]
-        lanes = max((len(one) for one in found), default=1)
-        return np.stack([np.broadcast_to(one, lanes) for one in found]) if found else np.zeros((0, lanes))
+        return self.values.at(q.T)[0].T
 
     def _keeps(self, lane: int) -> bool:
         """Return whether the poses are those that are stated."""
@@ -191,7 +186,8 @@ class _Closing:
         """Poses that keep the guesses too, one after the other, where the joints and those before let them."""
         for guess in _guesses(self._rows(_POSES, lane)):
             if max(abs(one.off(q)) for one in guess) > CLOSED * max(self.size, 1.0):
-                held = np.vstack([jacobian(self.terms, q, lane) / self.scale[:, None], _dense(kept, len(q))])
+                slope = self.values.of_lane(lane).jacobian(q[None])[0]
+                held = np.vstack([slope / self.scale[:, None], _dense(kept, len(q))])
                 if not _leaves_free(held, _dense(guess, len(q))):
                     continue
                 found = self._newton(q, lane, [*kept, *guess], GUESSED)
@@ -243,10 +239,10 @@ class _Closing:
     def _newton(self, q: Array, lane: int, stated: list[_Stated], most: int = ITERATIONS) -> Array | None:
         held = _dense(stated, len(q))
         wanted = np.array([one.value for one in stated])
-        small = CLOSED * self.scale
+        small, values = CLOSED * self.scale, self.values.of_lane(lane)
         least, since = np.inf, 0
         for _ in range(most):
-            gap = np.array([value_of(term, q, lane) for term in self.terms])
+            (gap,), slopes = values.at(q[None])
             away = held @ q - wanted
             if np.all(np.abs(gap) <= small) and np.all(np.abs(away) <= CLOSED * max(self.size, 1.0)):
                 return q
@@ -254,7 +250,7 @@ class _Closing:
             least, since = (off, 0) if off < FALLS * least else (least, since + 1)
             if since >= STALLED:
                 return None
-            rows = np.vstack([jacobian(self.terms, q, lane) / self.scale[:, None], held])
+            rows = np.vstack([values.dense(slopes, len(q))[0] / self.scale[:, None], held])
             move = np.linalg.lstsq(rows, -np.concatenate([gap / self.scale, away]), DEPENDENT)[0]
             longest = float(np.max(np.abs(move), initial=0.0))
             q = q + move * min(1.0, 0.5 * max(self.size, 1.0) / (longest + 1e-300))
@@ -305,19 +301,19 @@ class _Closing:
         return [(one, np.cross(spin, at(one, self.q, lane))) for one in frame.directors]
 
     def _rates(self, lane: int) -> _Rates:
-        terms: list[Term | Mesh] = [*self.terms, *self.meshes]
         scale = np.append(self.scale, np.ones(len(self.meshes)))
-        driven = np.array([drive_rate(term) for term in terms]) / scale
+        slope = self.moving.of_lane(lane).jacobian(self.q[:, lane][None])[0] / scale[:, None]
         stated = [one for one in self._rows(_RATES, lane) if one.firm]
-        return _Rates(terms, scale, driven, stated, max(1.0, float(np.max(np.abs(self.v[:, lane]), initial=0.0))))
+        return _Rates(
+            slope, self.moving.drift / scale, stated, max(1.0, float(np.max(np.abs(self.v[:, lane]), initial=0.0)))
+        )
 
     def _moves(self, lane: int, wanted: _Rates) -> bool:
         """Return whether the rates meet the constraints and what is stated, guesses among it."""
-        (terms, scale, driven, _, pace), v = wanted, self.v[:, lane]
+        (slope, driven, _, pace), v = wanted, self.v[:, lane]
         kept = all(abs(one.off(v)) <= CLOSED * pace for one in self._rows(_RATES, lane))
         kept = kept and all(np.all(np.abs(rows @ v) <= CLOSED * pace) for rows in self._straining(lane))
-        moving = np.array([sum(x * v[k] for k, x in slopes(term, self.q, lane)) for term in terms]) / scale
-        return bool(kept and np.all(np.abs(moving + driven) <= CLOSED * pace))
+        return bool(kept and np.all(np.abs(slope @ v + driven) <= CLOSED * pace))
 
     def _straining(self, lane: int) -> Iterator[Array]:
         """Of every flexible rod, the part of its vectors' rates that is no rigid motion, as rows of the rates.
@@ -343,8 +339,7 @@ class _Closing:
         asked = self._rates(lane)
         if self._moves(lane, asked):
             return True
-        (terms, scale, driven, stated, pace), q, v = asked, self.q[:, lane], self.v[:, lane].copy()
-        slope = jacobian(terms, self.q, lane) / scale[:, None] if terms else np.zeros((0, len(q)))
+        (slope, driven, stated, pace), q, v = asked, self.q[:, lane], self.v[:, lane].copy()
         held = _dense(stated, len(q))
         wanted = np.array([one.value for one in stated])
         rows, right = np.vstack([slope, held]), np.concatenate([-driven, wanted])
@@ -363,8 +358,9 @@ class _Closing:
         left = rows @ v - right
         worst = int(np.argmax(np.abs(left))) if left.size else 0
         if left.size and abs(left[worst]) > ROUNDING * pace:
-            if self.lanes == 1 and worst < len(terms) and not stated:
-                raise InputError(f"joints.{terms[worst].name}: cannot begin to move as it is driven")
+            if self.lanes == 1 and worst < len(slope) and not stated:
+                every: list[Term | Mesh] = [*self.terms, *self.meshes]
+                raise InputError(f"joints.{every[worst].name}: cannot begin to move as it is driven")
             return self._kept(stated, v, 0.0)
         if left.size and abs(left[worst]) > 1e-9 * pace:  # digits of stated rates: the joints come first
             slope_root = np.linalg.solve(root, slope.T).T
