@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from shoal.errors import InputError
 from shoal.mechanics.assembly.space import start
-from shoal.mechanics.assembly.term_values import TermValues
 from shoal.mechanics.simulate import simulate
+from shoal.mechanics.term_values import TermValues
 from shoal.scene import Scene
 from shoal.trajectory import Status
 

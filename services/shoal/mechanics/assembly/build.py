@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from shoal.mechanics import fitting, functions
-from shoal.mechanics.assembly import terms
+from shoal.mechanics import fitting, functions, terms
 from shoal.mechanics.assembly.loads import Loads, naming
 from shoal.mechanics.assembly.masses import Masses
 from shoal.mechanics.assembly.placement import place
-from shoal.mechanics.assembly.rows import Rows
 from shoal.mechanics.least import principle
 from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import index, stacked
 from shoal.mechanics.reach import span
+from shoal.mechanics.rows import Rows
 from shoal.mechanics.rubbing import Rubbing
 from shoal.scene import GROUND, Distance, Scene
 

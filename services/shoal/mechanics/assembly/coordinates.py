@@ -12,11 +12,11 @@ from shoal.mechanics import plane
 from shoal.mechanics.affine import Affine, fixed
 from shoal.mechanics.assembly.groups import JointPoint, is_stiff, kept_rotation, place_of
 from shoal.mechanics.assembly.pose import Pose
-from shoal.mechanics.assembly.terms import Terms
 from shoal.mechanics.frames import BeamFrame, Frame
 from shoal.mechanics.joints import Along, Apart, Geared, InPlane, Meet, Turned
 from shoal.mechanics.numerics.tile import Array, Flags, Number
 from shoal.mechanics.reach import span
+from shoal.mechanics.terms import Terms
 from shoal.scene import GROUND, Attachment, Function, Scene
 
 NO_LENGTH = 1e-9

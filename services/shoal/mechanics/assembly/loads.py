@@ -15,7 +15,6 @@ from shoal.mechanics.applied import Applied
 from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.assembly.groups import start_angle
 from shoal.mechanics.assembly.rods import rod_axis
-from shoal.mechanics.assembly.rows import Rows
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
 from shoal.mechanics.assembly.space.hinges import axis_of, turning
 from shoal.mechanics.forces import ANGLE, DISTANCE, PLACE, Forces
@@ -23,6 +22,7 @@ from shoal.mechanics.frames import BeamFrame, ModalFrame, RigidFrame
 from shoal.mechanics.functions import Piecewise
 from shoal.mechanics.numerics.tile import Number, index, stacked
 from shoal.mechanics.reach import span
+from shoal.mechanics.rows import Rows
 from shoal.scene import (
     GROUND,
     Attachment,

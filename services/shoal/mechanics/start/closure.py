@@ -16,13 +16,13 @@ import numpy as np
 
 from shoal.mechanics import plane
 from shoal.mechanics.affine import Affine, fixed
-from shoal.mechanics.assembly.term_values import TermValues, laned, one_lane
-from shoal.mechanics.assembly.terms import Terms
 from shoal.mechanics.fitting import start_slope, start_value
 from shoal.mechanics.joints import Geared, Turned, of_scene
 from shoal.mechanics.modal.modes import bent
 from shoal.mechanics.numerics.tile import Array, Flags, Index, Number
 from shoal.mechanics.plane import as_complex, phasor
+from shoal.mechanics.term_values import TermValues, laned, one_lane
+from shoal.mechanics.terms import Terms
 from shoal.scene import GROUND, Attachment, Function, PointMass, Rod, Scene
 
 POSE = 3

@@ -17,9 +17,9 @@ import numpy as np
 from shoal.errors import InputError
 from shoal.mechanics.assembly.space.redundancy import SHARE, joints_of
 from shoal.mechanics.assembly.space.values import uncancelled
-from shoal.mechanics.assembly.term_values import TermValues
-from shoal.mechanics.assembly.terms import Term
 from shoal.mechanics.numerics.tile import Array
+from shoal.mechanics.term_values import TermValues
+from shoal.mechanics.terms import Term
 from shoal.scene import Scene
 from shoal.scene.joints import places
 

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from shoal.mechanics.assembly.space.placement import place_in_space
-from shoal.mechanics.assembly.term_values import TermValues
-from shoal.mechanics.assembly.terms import Mesh, Term
 from shoal.mechanics.numerics.tile import Array
+from shoal.mechanics.term_values import TermValues
+from shoal.mechanics.terms import Mesh, Term
 from shoal.scene import Scene
 from shoal.scene.joints import places
 

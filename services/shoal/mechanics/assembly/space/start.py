@@ -20,12 +20,12 @@ from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
 from shoal.mechanics.assembly.space.locking import require_unlocked
 from shoal.mechanics.assembly.space.placement import place_in_space
 from shoal.mechanics.assembly.space.values import at, of_lane
-from shoal.mechanics.assembly.term_values import TermValues
-from shoal.mechanics.assembly.terms import Mesh, Term
 from shoal.mechanics.frames import BeamFrame, Frame, PointFrame, RigidFrame
 from shoal.mechanics.numerics.tile import Array, stacked
 from shoal.mechanics.start.start import place_at, rate_at
 from shoal.mechanics.start.strained import gives_way, require_numbers
+from shoal.mechanics.term_values import TermValues
+from shoal.mechanics.terms import Mesh, Term
 from shoal.scene import InitialState, Scene
 from shoal.scene.initial import Quantity
 from shoal.scene.paths import lanes_of
@@ -387,7 +387,7 @@ class _Closing:
 
     def _mass(self, lane: int) -> Array:
         from shoal.mechanics.assembly.masses import Masses
-        from shoal.mechanics.assembly.rows import Rows
+        from shoal.mechanics.rows import Rows
 
         count = len(self.q)
         matrix = np.zeros((count, count))

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from shoal.mechanics.affine import Affine
-from shoal.mechanics.assembly.terms import Term
 from shoal.mechanics.numerics.tile import Array
+from shoal.mechanics.terms import Term
 
 
 def of_lane(rows: Array, lane: int) -> Array:

@@ -13,9 +13,9 @@ from itertools import pairwise
 import numpy as np
 
 from shoal.mechanics.affine import Affine
-from shoal.mechanics.assembly.terms import Mesh, Term
 from shoal.mechanics.fitting import start_slope, start_value
 from shoal.mechanics.numerics.tile import Array, Index
+from shoal.mechanics.terms import Mesh, Term
 
 
 class TermValues:
