@@ -1,6 +1,6 @@
-"""What a caller may ask for: limits of numbers and lists of numbers, as library, command line and services check them.
+"""Limits of arguments: numbers and lists of numbers, as library, command line and services check them.
 
-The command line and the services read `LIMITS`, so that help and schemas tell the same; what computes calls `check`.
+Command line and services read `LIMITS`, so that help and schemas agree; functions of the library call `check`.
 """
 
 from __future__ import annotations

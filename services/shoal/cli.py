@@ -98,7 +98,7 @@ class Program(click.Group):
 
 
 def _open_all() -> None:
-    """Where a shell has closed a stream (`>&-`) what is said goes nowhere; else a file that is opened would get it."""
+    """Open streams that a shell has closed (`>&-`) on the null device; else the next file would get their text."""
     for name, mode in {"stdin": "r", "stdout": "w", "stderr": "w"}.items():
         if getattr(sys, name) is None:
             setattr(sys, name, Path(os.devnull).open(mode, encoding="utf-8"))  # noqa: SIM115 - until the end
@@ -106,13 +106,13 @@ def _open_all() -> None:
 
 @cache
 def _added() -> dict[str, EntryPoint]:
-    """Where the commands of other packages are, by name."""
+    """Return the entry points of commands of other packages, by name."""
     return {point.name: point for point in entry_points(group="shoal.commands")}
 
 
 @contextmanager
 def _extras_named() -> Iterator[None]:
-    """Where a module is missing that an extra brings, say which extra. Raises InputError."""
+    """Name the extra that brings a missing module. Raises InputError."""
     try:
         yield
     except ModuleNotFoundError as error:

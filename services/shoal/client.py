@@ -92,11 +92,11 @@ class Client:
         return str(self._answer("POST", f"/v1/jobs/{operation}", request, lambda found: found["id"]))
 
     def status(self, job: str) -> Answer:
-        """How a job goes: its `status` is queued, running, done, failed or cancelled; `problem` says why it failed."""
+        """Return the state of a job: `status` queued, running, done, failed or cancelled; `problem`: why it failed."""
         return dict(self._answer("GET", f"/v1/jobs/{job}", read=_job))
 
     def result(self, job: str) -> Any:
-        """What a job that is done has found: that of `submit` what its method returns."""
+        """Return the result of a finished job, as the method of the same name returns it."""
         return self._answer("GET", f"/v1/jobs/{job}/result")
 
     def cancel(self, job: str) -> None:
@@ -178,7 +178,7 @@ def _object(found: Any) -> Any:
 
 
 def _job(found: Answer) -> Answer:
-    """How a job goes. Raises KeyError where it is none."""
+    """Return the state of a job. Raises KeyError for an unknown one."""
     return {**found, **{name: found[name] for name in ("status", "operation", "progress")}}
 
 
@@ -259,7 +259,7 @@ def _numbers(table: Table) -> dict[str, Array]:
 
 
 def _plain(value: Any, field: str) -> Any:
-    """As JSON has it. Raises InputError for numbers that are not finite, which JSON would write as null."""
+    """Return a value as JSON holds it. Raises InputError for numbers that are not finite, which would become null."""
     value = unwrapped(value)
     if isinstance(value, Mapping):
         return {key: _plain(one, f"{field}.{key}") for key, one in value.items()}

@@ -194,7 +194,7 @@ def check_nights(address: str) -> Check:
 
 
 def _asked(url: str, data: object = None, headers: Mapping[str, str] | None = None) -> Any:
-    """What a server answers. Raises URLError, OSError, ValueError."""
+    """Return the answer of a server. Raises URLError, OSError, ValueError."""
     body = None if data is None else json.dumps(data).encode()
     with urlopen(
         Request(url, body, {"Content-Type": "application/json", **(headers or {})}), timeout=PATIENCE
@@ -203,7 +203,7 @@ def _asked(url: str, data: object = None, headers: Mapping[str, str] | None = No
 
 
 def check_ports() -> list[Check]:
-    """Who listens where the servers of `make up` would, and whether the night is scheduled on Prefect's there."""
+    """Check the ports of the servers of `make up`, and whether the nightly run is scheduled."""
     numbers, wrong = {}, []
     for what, default in _PORTS.items():
         try:
@@ -215,7 +215,7 @@ def check_ports() -> list[Check]:
 
 
 def check_port(number: int, what: str, patience: float = PATIENCE) -> Check:
-    """Who listens where `what` would; patience: seconds that it has to answer."""
+    """Check the port of `what`; patience: seconds to wait for an answer."""
     with socket.socket() as probe:
         probe.settimeout(patience)
         taken = probe.connect_ex(("127.0.0.1", number)) == 0

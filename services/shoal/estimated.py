@@ -17,9 +17,9 @@ LARGEST = 200_000_000
 
 
 def read_estimate(path: Path, asked: str, part: str) -> dict[str, Any]:
-    """What `shoal identify --json` or `--out FILE.json` wrote, with mappings `parameters`, `left_out` and a part of it.
+    """Read an estimate of `shoal identify --json` or `--out FILE.json`: `parameters`, `left_out` and a part of it.
 
-    asked: what the file was named in, which begins every refusal. Raises InputError.
+    asked: the option or field that named the file, which begins every error. Raises InputError.
     """
     wanted = "give what `shoal identify --out FILE.json` wrote"
     require_regular(path, asked)

@@ -1,4 +1,4 @@
-"""What a scene expects of itself (`expect:`), as a question to one run: when to look, and how far it is from right."""
+"""Expectations of a scene (`expect:`), each as a check of one run: its instants, and the error of the motion."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ QUANTITIES = ("x", "y", "angle")
 
 @dataclass(frozen=True)
 class Question:
-    """What is asked of a run.
+    """A check of a run.
 
-    scene: to simulate; times: to look at [s], (times,); source: who says what is right; unit: of the error;
-    error: of a motion, which raises InputError or ComputationError; None where only the night before can tell
+    scene: to simulate; times: to look at [s], (times,); source: of the expected value; unit: of the error;
+    error: of a motion, which raises InputError or ComputationError; None where only the previous night is the reference
     """
 
     scene: Scene

@@ -1,7 +1,7 @@
-"""The library of one's own: scenes, recordings, problems and studies that are checked before they are kept.
+"""The user library: scenes, recordings, problems and studies that are checked before they are kept.
 
 Their names stand beside the built-in ones wherever one is taken. An entry holds all files that it needs and that are
-not themselves in the library; what it names there is looked up anew each time, until a study holds on to it.
+not themselves in the library; references to other entries are resolved at each use, unless a study pins a version.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ Documents = dict[str, bytes]
 
 @dataclass(frozen=True)
 class Kind:
-    """What the library holds. folder: its name there; one: in words; check: of a document, raises InputError.
+    """A kind of entry of the library. folder: its name there; one: in words; check: of a document, raises InputError.
 
     mark: the field that only its documents have; built_in: names that are taken; references: how a document names
     another file (the keys that lead there, `*` for any), and of which kind that is; "" is none of them, a table
@@ -64,7 +64,7 @@ def _check_scene(document: Path) -> None:
 
 
 def _model(scene: Scene) -> Model:
-    """What a simulation begins with: functions of time that can be computed, a start. Raises InputError."""
+    """Build the model of a scene, with its functions of time and its start. Raises InputError."""
     from shoal.engines.capabilities import check_acceleration
     from shoal.mechanics.simulate import machine
 
@@ -157,7 +157,7 @@ def entry(name: str, kind: str | None = None) -> Entry:
 
 
 def about(entry: Entry) -> dict[str, Any]:
-    """What lists and services say of an entry."""
+    """Return the summary of an entry for lists and services."""
     try:
         data = read_yaml(_text(_content(entry.document, LARGEST), entry.document), entry.name)
         description = str(data.get("description", "")) if isinstance(data, dict) else ""
@@ -271,7 +271,7 @@ def _check_paths(kind: Kind, document: Path) -> None:
 
 
 def _places(data: Any, wanted: Keys, above: Keys = ()) -> Iterable[tuple[Keys, str]]:
-    """Where texts stand in a document: the keys that lead there, and the text."""
+    """Yield the texts of a document: the keys of each, and the text."""
     if not isinstance(data, dict):
         return
     for key in list(data) if wanted[0] == "*" else [key for key in wanted[:1] if key in data]:

@@ -50,7 +50,7 @@ class Memory:
             raise InputError(f"checkpoint: {path} cannot be written: {error.strerror}") from None
 
     def recall(self, model: object, points: Array) -> Array | None:
-        """What was kept for a batch, or None."""
+        """Return the cached values of a batch, or None."""
         found = self._known.get(_key(model, points))
         self.recalled += 0 if found is None else len(points)
         return found
@@ -93,5 +93,5 @@ class Memory:
 
 
 def _key(model: object, points: Array) -> bytes:
-    """Of a batch; model: what tells the models of one study apart, by its `repr`."""
+    """Return the key of a batch; model: identifies a model of the study by its `repr`."""
     return hashlib.sha1(repr((model, points.shape)).encode() + points.tobytes()).digest()

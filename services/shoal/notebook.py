@@ -1,4 +1,4 @@
-"""What `import shoal` offers: the main commands as functions, with answers that a notebook shows.
+"""Public functions of `import shoal`: the main commands, with results that a notebook shows.
 
 A scene or problem is given as an object, as a mapping of its fields, by its name, or as the path of a YAML file.
 """
@@ -144,18 +144,18 @@ def uncertain(
     seed: int = 0,
     progress: Callable[[int], None] | None = None,
 ) -> Response:
-    """How the markers may move if fields of the scene are known as intervals or distributions only.
+    """Bound or predict the motion of the markers if fields of the scene are intervals or distributions.
 
-    vary: path -> (low, high), a text such as "normal(1, 0.01)" or a frozen distribution of scipy, or a list of what
-    `--vary` takes; times: instants [s], else the scene's own; gap: between outer and attained bounds, as a share of the
+    vary: path -> (low, high), a text such as "normal(1, 0.01)" or a frozen distribution of scipy, or a list of texts of
+    `--vary`; times: instants [s], else the scene's own; gap: between outer and attained bounds, as a share of the
     largest width, that must be reached; tolerance: error [m] of the model; correlations: of pairs of random parameters;
     degree, count: of a method that has one; most: runs that may be made; verify: estimate mesh and step errors of
     extremal runs; limits: what must not happen, such as "B.y < -1.2"; requirements: what must hold, such as
     "B.y > -1.2"; limit_method: auto, form, importance, subset or monte-carlo; limit_runs: for each of their
     probabilities; allocate: look for the widest tolerances that keep the limit, with `costs` (by path, else 1) of
     tightening each; target: probability of passing it that is allowed, else 0.001; checkpoint: file that keeps the
-    runs, from which the same study goes on; time_limit [s]: after which it ends with what is known; progress: is told
-    how many runs there are. Raises InputError, ComputationError.
+    runs, from which the same study goes on; time_limit [s]: after which it ends with what is known; progress: called
+    with the number of runs. Raises InputError, ComputationError.
     """
     from shoal.response import uncertain
 
@@ -194,7 +194,7 @@ def compare(
     values: Values | None = None,
     verify: bool = True,
 ) -> Comparison:
-    """Run a scene on several engines; `differences()` tells how far apart they come out.
+    """Run a scene on several engines; `differences()` returns the distances of their results.
 
     engines: by name; else our solver and at most two that can run the scene; verify: estimate the errors that they may
     share, of the mesh and of the theory, by more careful runs of one. Raises InputError.

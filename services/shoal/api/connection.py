@@ -33,12 +33,12 @@ _TICK = 0.5
 
 @dataclass(frozen=True)
 class Patience:
-    """What a server grants to peers.
+    """Limits of a server for its peers.
 
     header_seconds: from the beginning of a connection, or from the last answer, until the headers are complete
     body_seconds: from there until the body is complete; None for no limit
     body_bytes: of a body that goes on when it has been answered already; None for no limit
-    connections: open at once, beyond which those that owe something are closed, the oldest first; None for no limit
+    connections: open at once; beyond, connections with incomplete requests are closed, the oldest first; None: no limit
     """
 
     header_seconds: float = 10.0
@@ -173,7 +173,7 @@ class BoundedProtocol(H11Protocol):
         return False
 
     def _close(self) -> None:
-        """Say that it took too long, where nothing has been said yet, and end the connection whatever is unsent."""
+        """Answer that the request took too long, unless an answer has begun, and drop the connection."""
         said_nothing = self.conn.our_state in (h11.IDLE, h11.SEND_RESPONSE)
         begun = self.conn.their_state is not h11.IDLE or bool(self.conn.trailing_data[0])
         if said_nothing and begun and not self.transport.is_closing() and not self.transport.get_write_buffer_size():
@@ -202,7 +202,7 @@ class HandshakeLoop(asyncio.SelectorEventLoop):
 
 
 class Crowd:
-    """ASGI middleware that computes no more than so many requests at a time; more are refused at once."""
+    """ASGI middleware that limits the number of concurrent requests; more are refused at once."""
 
     def __init__(self, application: Application, most: int) -> None:
         self.application, self.most, self._now = application, most, 0

@@ -1,4 +1,4 @@
-"""Where a worker's process begins. It loads what computes; the service, which imports this too, never does."""
+"""Entry point of a worker's process. It loads the library; the service, which imports this module too, never does."""
 
 from __future__ import annotations
 

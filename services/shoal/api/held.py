@@ -20,7 +20,7 @@ class NoSuch(InputError):  # noqa: N818 - a refusal, not a failure
 
 
 def library(bench: Bench, asked: LibraryTask, note: Note) -> bytes:
-    """Do what is asked and say what is there then. Raises InputError, NoSuch, TooMuch."""
+    """Perform a task on the library and return its entries. Raises InputError, NoSuch, TooMuch."""
     if asked.operation == "list":
         entries = [own.about(entry) for entry in own.entries()]
         names = {"scenes": built_in_scenes(), "problems": built_in_problems()}

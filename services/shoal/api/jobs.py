@@ -41,7 +41,7 @@ class Job:
         self.tell()
 
     def note(self, progress: dict[str, float | None]) -> None:
-        """How far it is, in numbers by name."""
+        """Take the progress, numbers by name."""
         self.progress = progress
         self.tell()
 
@@ -52,7 +52,7 @@ class Job:
 
     @property
     def status(self) -> JobStatus:
-        """What a client sees."""
+        """Return the status for clients."""
         problem = None if self.refusal is None else self.refusal.document.model_dump(exclude_none=True)
         return JobStatus(
             id=self.id, operation=self.operation, status=self.state, progress=self.progress, problem=problem

@@ -1,4 +1,4 @@
-"""How much a request may ask for, before anything is computed."""
+"""Limits on the size of requests, checked before anything is computed."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class TooMuch(InputError):  # noqa: N818 - a refusal, not a failure
 
 
 def check_scene(scene: Scene, settings: Settings, times: Sequence[float] | None = None, lanes: int = 1) -> None:
-    """Return whether a scene may be simulated in so many lanes. times [s]: of the samples. Raises TooMuch."""
+    """Check that a scene may be simulated in this number of lanes. times [s]: of the samples. Raises TooMuch."""
     solver = scene.solver
     elements = _elements(scene)
     if elements > settings.max_elements:
@@ -65,9 +65,7 @@ def _elements(scene: Scene) -> int:
 
 
 def _adaptive(scene: Scene, integrator: str | None = None) -> bool:
-    """Return whether an integrator, else the one that a scene names, chooses its steps; of `auto` only the model
-    tells.
-    """
+    """Return whether an integrator, else that of the scene, is adaptive; for `auto` this takes the model."""
     name = integrator or scene.solver.integrator
     return name in INTEGRATORS and facts(name).adaptive
 

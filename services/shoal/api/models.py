@@ -35,7 +35,7 @@ from shoal.trajectory import Array
 
 
 class Config(Asked):
-    """What a model stands for."""
+    """Configuration of a model."""
 
     problem: BuiltIn | dict[str, Any] | None = None
     values: Fields = {}
@@ -54,12 +54,12 @@ class VectorFunction:
 
     @property
     def inputs(self) -> int:
-        """How many parameters."""
+        """Return the number of parameters."""
         return len(self.forward.names)
 
     @property
     def outputs(self) -> int:
-        """How many numbers come out."""
+        """Return the number of outputs."""
         return 1 if self.squared else len(self.forward.rows.time)
 
     def evaluate(self, values: Array) -> Array:

@@ -1,7 +1,7 @@
-"""What a service computes: one request each, by the name of the library's function that answers it.
+"""Requests of a service, one for each function of the library, by its name.
 
 The fields of a request are the arguments of that function. Quantities are in SI units, angles in radians. The service's
-own process knows the requests only; who computes them is `tasks`.
+own process knows the requests only; `tasks` computes them.
 """
 
 from __future__ import annotations
@@ -40,9 +40,9 @@ Uncertainty = Annotated[tuple[End, End] | Distribution, BeforeValidator(_known)]
 
 
 class Request(Asked):
-    """Base of all. answer: what comes back; follows: the numbers by which a job tells how far it is.
+    """Base of all requests. answer: type of the answer; follows: the numbers by which a job reports progress.
 
-    objects: answer what the library's function returns, whole, as `shoal.wire` writes it for `shoal.Client`
+    objects: answer the whole object of the library's function, as `shoal.wire` writes it for `shoal.Client`
     """
 
     answer: ClassVar[Any] = dict[str, Any]
@@ -73,7 +73,7 @@ class OfScene(Request):
 
     @property
     def runs(self) -> int:
-        """How often it is computed beside that."""
+        """Return the number of further runs."""
         return 1
 
 
@@ -136,10 +136,10 @@ class Sweep(OfScene):
 
 
 class Uncertain(OfScene):
-    """How the markers may move if fields of the scene are intervals or distributions; see `shoal uncertain`.
+    """Bounds and statistics of the markers if fields are intervals or distributions; see `shoal uncertain`.
 
-    vary: path -> [low, high], or a text such as "normal(1, 0.01)"; a bound such as "-2%" is relative to what the scene
-    states; correlations: [path, path, value] of random ones; times: instants [s], else the scene's own; gap:
+    vary: path -> [low, high], or a text such as "normal(1, 0.01)"; a bound such as "-2%" is relative to the value of
+    the scene; correlations: [path, path, value] of random ones; times: instants [s], else the scene's own; gap:
     between outer and attained bounds, as a share of the width, to be reached; tolerance: error [m] of the model
     verify: estimate mesh and step errors of extremal runs; most: runs that may be made
     limits: what must not happen, such as "B.y < -1.2"; requirements: what must hold, such as "B.y > -1.2";
@@ -172,7 +172,7 @@ class Uncertain(OfScene):
 
     @property
     def runs(self) -> int:
-        """That may be made, or nearly so."""
+        """Return the number of runs that may be made, about."""
         return self.most + (len(self.limits) + len(self.requirements) + 4 * self.allocate) * self.limit_runs
 
     def arguments(self) -> dict[str, Any]:
@@ -184,7 +184,7 @@ class Uncertain(OfScene):
 
 
 class AtRest(OfScene):
-    """What needs no motion. verify: estimate the error of the mesh by a second run on twice as many elements."""
+    """Base of analyses without a motion. verify: estimate the mesh error by a second run on twice as many elements."""
 
     verify: bool = True
 
@@ -195,7 +195,7 @@ class AtRest(OfScene):
 
 
 class Statics(AtRest):
-    """Where a scene comes to rest, with what is applied as it is at `time` [s], and whether it is stable there."""
+    """Static equilibrium of a scene, with the loads at `time` [s], and its stability."""
 
     time: Annotated[float, limited("time")] = 0.0
     tolerance: Tolerance | None = None
@@ -254,10 +254,10 @@ class Identify(OfProblem):
 
 
 class Design(OfProblem):
-    """What to measure to know the parameters best; the fields are those of `shoal design`.
+    """Optimal experiment design for the parameters; the fields are those of `shoal design`.
 
-    about: `answer` is what the data tell, `start` needs none; noise in m, angle_noise in rad, sensor_noise by
-    what a sensor measures (acceleration, rate, force, torque, strain) in SI units, duration in s, rate in Hz
+    about: `answer`, of an identification, or `start`, which needs no data; noise in m, angle_noise in rad, sensor_noise
+    by what a sensor measures (acceleration, rate, force, torque, strain) in SI units, duration in s, rate in Hz
     """
 
     about: Literal["answer", "start"] | None = None

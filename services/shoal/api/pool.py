@@ -33,7 +33,7 @@ async def _end_if(gone: Callable[[], Awaitable[bool]], worker: Worker, answer: a
 
 
 class Pool:
-    """So many workers, made by `make`; at most `queue` tasks wait for one, first come, first served."""
+    """A fixed number of workers, made by `make`; at most `queue` tasks wait for one, first come, first served."""
 
     def __init__(self, make: Callable[[], Worker], count: int, queue: int) -> None:
         self._make, self._count, self._queue = make, count, queue
@@ -126,7 +126,7 @@ class Pool:
             self._line.remove(turn)
 
     def _release(self, worker: Worker) -> None:
-        """Hand a worker to whoever waits longest: nobody who comes later takes it before."""
+        """Hand a worker to the task that has waited longest."""
         if not worker.up:
             self._replace(worker)
         elif self._line:

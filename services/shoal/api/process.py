@@ -67,7 +67,7 @@ def main(pipe: Connection, make_engine: Callable[[], Engine], settings: Settings
 
 
 def _made(pipe: Connection, make_engine: Callable[[], Engine]) -> Engine | None:
-    """The engine, after a short run; tells the service what it can do, or why it could not be made."""
+    """Make the engine and run it briefly; send the service its capabilities, or why it failed."""
     try:
         engine = make_engine()
         scene = load_scene("flexible-double-pendulum")
@@ -81,7 +81,7 @@ def _made(pipe: Connection, make_engine: Callable[[], Engine]) -> Engine | None:
 
 
 def about(engine: Engine) -> dict[str, Any]:
-    """What clients may want to know: the engine's capabilities, schemas, versions."""
+    """Return the engine's capabilities, schemas and versions for clients."""
     able = engine.capabilities
     kinds = {name: sorted(getattr(able, name)) for name in ("elements", "joints", "loads", "features")}
     return {

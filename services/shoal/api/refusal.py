@@ -101,7 +101,7 @@ def of_validation(error: RequestValidationError) -> Refusal:
 
 
 def _of_content(request: Request, error: RequestValidationError) -> Refusal | None:
-    """Where a body was not read as JSON because nobody said that it is."""
+    """Return a refusal where a body was not read as JSON for lack of a content type."""
     stated = request.headers.get("content-type", "")
     if error.errors()[0]["loc"] != ("body",) or "json" in stated:
         return None

@@ -1,4 +1,4 @@
-"""What a service is asked and what it answers. Quantities are in SI units, angles in radians."""
+"""Schemas of requests and answers. Quantities are in SI units, angles in radians."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ class Motion(BaseModel):
     """Motion of one scene per lane.
 
     times [s]: (samples,); points: marker positions [m], (samples, markers, 2, lanes); angles [rad]: (samples, markers,
-    lanes); velocities [m/s] and rates [rad/s] likewise, null where the engine does not tell them
+    lanes); velocities [m/s] and rates [rad/s] likewise, null where the engine does not return them
     status, energy_drift, constraint_drift: one per lane; steps: time steps; wall_s: of the computation
     model: what was computed; its `verification` holds the estimated errors [m], of lanes the largest of a few of them
-    selection: with a tolerance, how the model was found; end: of one scene, the state at which another run may go on
-    reasons, changes: one per lane, where lanes were asked for: why it is not ok (empty if it is), and what it uses in
-    place of what the scene states of its start, as `initial_changes` of the `model` of one scene
+    selection: with a tolerance, how the model was found; end: of one scene, the final state, from which a run can go on
+    reasons, changes: one per lane, where lanes were requested: why it is not ok (empty if it is), and the values
+    used in place of stated ones of its start, as `initial_changes` of the `model` of one scene
     Numbers that are not finite are null.
     """
 
@@ -64,7 +64,7 @@ class Table(Asked):
 
 
 class JobStatus(BaseModel):
-    """A computation in the background. progress: how it goes, if it tells; problem: why it failed, as a document."""
+    """A computation in the background. progress: numbers by name, if known; problem: why it failed, as a document."""
 
     id: str
     operation: str
@@ -74,7 +74,7 @@ class JobStatus(BaseModel):
 
 
 class EngineDocument(BaseModel):
-    """What the engine can simulate; see `shoal.engines.Capabilities`."""
+    """Capabilities of the engine; see `shoal.engines.Capabilities`."""
 
     engine: str
     elements: list[str]
@@ -85,7 +85,7 @@ class EngineDocument(BaseModel):
 
 
 class LibraryEntry(BaseModel):
-    """What the library holds under a name. kind: scenes, recordings, problems or studies; version: a hash of it all."""
+    """An entry of the library. kind: scenes, recordings, problems or studies; version: a hash of its content."""
 
     kind: str
     name: str
@@ -94,9 +94,9 @@ class LibraryEntry(BaseModel):
 
 
 class Library(BaseModel):
-    """Built-in names, and the entries of this installation's own library.
+    """Built-in names, and the entries of this installation's user library.
 
-    identity: tells this library from others; empty before anything made it.
+    identity: of this library; empty before it exists.
     """
 
     identity: str
@@ -119,7 +119,7 @@ class PutRequest(Asked):
 
 
 class LibraryTask(NamedTuple):
-    """What is asked of the library; name is NAME or NAME@VERSION."""
+    """A task on the library; name is NAME or NAME@VERSION."""
 
     operation: Literal["list", "get", "put", "delete"]
     kind: str = ""
@@ -135,7 +135,7 @@ class VersionDocument(BaseModel):
 
 
 class Health(BaseModel):
-    """Whether the program lives, or is ready to compute."""
+    """Liveness or readiness of the program."""
 
     status: str
 
@@ -160,7 +160,7 @@ class ModelCall(Base):
 
 
 class ModelTask(NamedTuple):
-    """A call of a model, and what is asked of it."""
+    """A call of a model, and the requested operation."""
 
     operation: Operation
     call: ModelCall

@@ -1,4 +1,4 @@
-"""What a service allows, from the environment: SHOAL_API_WORKERS and so on."""
+"""Settings of a service, from the environment: SHOAL_API_WORKERS and so on."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ Seconds = Annotated[float, Field(gt=0)]
 class Settings(BaseSettings):
     """Limits of one service.
 
-    keys_file: one API key per line, after its name if it has one; without the file nobody is asked for a key
+    keys_file: one API key per line, after its name if it has one; without the file no key is needed
     workers, job_workers: processes for single calls and for identifications
-    queue, job_queue: how many may wait for a worker; more are told to come again
+    queue, job_queue: tasks that may wait for a worker; more are refused with Retry-After
     connections: open at once
     header_seconds: until a request's headers are complete
     body_bytes, json_depth, receive_seconds: of a request's body
@@ -30,9 +30,9 @@ class Settings(BaseSettings):
     max_work: steps x elements x lanes of a simulation (a rigid body counts as one element)
     max_elements: of a scene; max_values: samples x markers x lanes of a result
     max_memory_mb: data of one worker process [MiB]
-    keep_jobs, keep_seconds: how many finished identifications are kept, and for how long
+    keep_jobs, keep_seconds: number of finished identifications that are kept, and for how long
     library: folder of the library, else that of $SHOAL_LIBRARY; library_mb: of all files in it [MB]
-    model: the problem that UM-Bridge's models stand for where a call names none
+    model: the problem of UM-Bridge's models where a call names none
     """
 
     model_config = SettingsConfigDict(env_prefix=PREFIX, frozen=True)
@@ -69,7 +69,7 @@ class Settings(BaseSettings):
             raise InputError(f"{PREFIX}{name.upper()}: {rest}") from None
 
     def keys(self) -> dict[bytes, str]:
-        """Return the API keys with their names; none if anybody may ask. Raises InputError.
+        """Return the API keys with their names; none if no key is needed. Raises InputError.
 
         A line is `KEY` or `NAME KEY`; a key without a name is called by its line, as in `key 2`.
         """

@@ -70,7 +70,7 @@ def check_key(request: Request) -> None:
 
 
 class StrictRoute(APIRoute):
-    """A route whose requests are strict ones; nobody without a key has a body read."""
+    """A route that validates strictly; without a key no body is read."""
 
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
         """The handler that FastAPI calls."""

@@ -1,4 +1,4 @@
-"""What a worker computes: plain functions from a request to JSON."""
+"""Tasks of a worker: plain functions from a request to JSON."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ Note = Callable[[Any], None]
 
 @dataclass(frozen=True)
 class Bench:
-    """What a worker computes with, in a working folder of its own."""
+    """Engine and settings of a worker, in a working folder of its own."""
 
     engine: Engine
     settings: Settings
@@ -58,7 +58,7 @@ def check(bench: Bench, asked: Call, note: Note) -> bytes:
 
 
 def _prepared(bench: Bench, asked: Call) -> Computation:
-    """What answers a call whose scene or problem is right and not too large. Raises InputError."""
+    """Check the scene or problem of a call and return its computation. Raises InputError."""
     name, request = asked
     if getattr(request, "tolerance", None) is not None and bench.engine.name != "gauss":
         raise InputError(f"tolerance: models are chosen for engine gauss only, found engine {bench.engine.name!r}")
@@ -104,7 +104,7 @@ def _of_problem(bench: Bench, request: OfProblem) -> dict[str, Any]:
 
 
 def _computed(bench: Bench, name: str, arguments: dict[str, Any], request: Request, note: Note) -> bytes:
-    """What the library's function of that name gives, as the command of that name prints it, or whole."""
+    """Call the library's function of that name; return the JSON of the command of that name, or the whole object."""
     function = getattr(notebook, name)
     if "engine" in signature(function).parameters:
         arguments = {**arguments, "engine": bench.engine.name}

@@ -59,7 +59,7 @@ class Worker:
         self.about = self._answer(START_SECONDS, lambda _: None)
 
     def run(self, task: str, request: Any, seconds: float, note: Note) -> bytes:
-        """Compute one of process.TASKS within so many seconds, beside those in which kernels are compiled.
+        """Compute one of process.TASKS within a time [s] that does not count the compilation of kernels.
 
         Raises Refusal; where the process did not survive, the worker is not up.
         """
@@ -97,7 +97,7 @@ class Worker:
         return Refusal("crashed", f"the worker died (exit code {code}); a fresh one replaces it")
 
     def kill(self) -> None:
-        """End the process at once, whatever it is doing."""
+        """Kill the process."""
         if self._process is not None and self._process.pid is not None:
             self._process.kill()
             self._process.join()

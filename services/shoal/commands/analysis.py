@@ -1,4 +1,4 @@
-"""What a scene is like: at rest, in small motions, in its joints."""
+"""Commands for static equilibrium, modes and joint reactions."""
 
 from __future__ import annotations
 

@@ -76,7 +76,7 @@ def export_fmu(
 @click.option("--verify/--no-verify", default=True, show_default=True, help="Run it there and here, and compare.")
 @options.out(".py", ".xml", otherwise="; else the scene's name")
 def export(scene: str, to: str, values: Values, verify: bool, out: Out) -> None:
-    """Write SCENE as a file of another tool. How far its motion is from ours is told on stderr."""
+    """Write SCENE as a file of another tool. The distance of its motion from ours is printed on stderr."""
     from shoal.exported import checked, export
     from shoal.scene import load_scene
     from shoal.terminal import screen

@@ -1,4 +1,4 @@
-"""`shoal library`: scenes, problems and recordings of one's own, by name."""
+"""`shoal library`: the user library of scenes, problems and recordings, by name."""
 
 from __future__ import annotations
 
@@ -140,7 +140,7 @@ def _names(found: dict[str, Any]) -> dict[str, list[str]]:
 
 
 def _changed(names: dict[str, list[str]] | None = None, identity: str | None = None) -> None:
-    """Update whatever shows the names of a library; print why something was not updated.
+    """Update the places that show the names of a library; print why one was not updated.
 
     names: by kind, identity: of that library; else those of the library here. Other packages add functions by the
     entry points of the group `shoal.library`; each returns a line for the user, or "".

@@ -1,4 +1,4 @@
-"""What several commands are given, and how it is read. Raises click's errors, or InputError."""
+"""Options that several commands share, and how they are read. Raises click's errors, or InputError."""
 
 from __future__ import annotations
 
@@ -189,7 +189,7 @@ def times_list(context: click.Context, parameter: click.Parameter, given: tuple[
 
 
 def _carried(context: click.Context, parameter: click.Parameter, path: Path | None) -> Carried | None:
-    """What an estimate's file carries."""
+    """Return the estimate of a file that is carried over."""
     if path is None:
         return None
     from shoal.identification.carried import read_values
@@ -212,12 +212,12 @@ def _with_carried(context: click.Context, parameter: click.Parameter, pairs: tup
 
 
 def set_values() -> Values:
-    """What --set of the command that runs states, without what an estimate's file carries."""
+    """Return the values of --set of the running command, without those of an estimate's file."""
     return dict(click.get_current_context().meta.get(_SET, {}))
 
 
 class LateHelp(click.Option):
-    """An option whose help waits until somebody asks, as do the imports that it needs."""
+    """An option whose help, with its imports, is made on demand."""
 
     def __init__(self, *args: Any, told: Callable[[], str], **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
@@ -242,7 +242,7 @@ def _engines() -> str:
 
 
 class EngineName(click.ParamType):  # type: ignore[type-arg]  # click 8.1 has none
-    """One of the engines there are; their import waits until somebody asks."""
+    """The name of an engine; engines are imported on demand."""
 
     name = "engine"
 

@@ -49,7 +49,7 @@ def stated(context: click.Context, parameter: click.Parameter, given: str) -> st
 
 
 def _as_option(field: str, value: Any, option: click.Parameter) -> Any:
-    """What would stand on the command line."""
+    """Return a value as it would stand on the command line."""
     once = isinstance(option, Once)
     if option.multiple and not once:
         from shoal.response.stated import pairs

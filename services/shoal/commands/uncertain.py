@@ -149,7 +149,7 @@ def uncertain(
     as_json: bool,
     out: Out,
 ) -> None:
-    """How SCENE may move if some of its fields are intervals or distributions.
+    """Bound or predict the motion of SCENE if some of its fields are intervals or distributions.
 
     Intervals give bounds that runs attain, distributions give means, deviations, quantiles and Sobol indices. A
     requirement states what must hold, a limit what must not happen: with intervals the answer is whether it can be

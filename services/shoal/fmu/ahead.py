@@ -40,7 +40,7 @@ class Ahead:
         self._energies: Array | None = None
 
     def take(self, time: float, step: float, values: dict[str, float]) -> None:
-        """What inputs are from a time on [s], for a communication step. Raises InputError."""
+        """Take the inputs from a time on [s], for a communication step. Raises InputError."""
         if self._inputs.take(time, step, values):
             self._scene = self._inputs.applied(self._stated)
             self._run, self._energies, self._fresh = None, None, True

@@ -62,7 +62,7 @@ def export(
 
 
 def _builder(fmi: str) -> tuple[Any, str]:
-    """What builds units of a version of FMI, and the script inside."""
+    """Return the builder of units of a version of FMI, and the script inside."""
     if fmi == "2":
         from pythonfmu.builder import FmuBuilder
 

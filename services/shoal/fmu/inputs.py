@@ -1,4 +1,4 @@
-"""What a host changes during a run, as tables over time of the scene that is simulated."""
+"""Inputs of a host during a run, as tables over time in the simulated scene."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Inputs:
         self._rows = {path: [(0.0, value)] for path, value in self.values.items()}
 
     def take(self, time: float, step: float, values: dict[str, float]) -> bool:
-        """What is asked for from a time on [s], up to the next communication point; whether anything changes."""
+        """Take the inputs from a time on [s] to the next communication point; return whether any change."""
         changed = [path for path, value in values.items() if value != self._rows[path][-1][1]]
         for path in changed:
             rows, value = self._rows[path], values[path]
@@ -46,7 +46,7 @@ class Inputs:
         return bool(changed)
 
     def applied(self, scene: Scene) -> Scene:
-        """The scene with what is known so far; after that all stays as it is. Raises InputError."""
+        """Return the scene with the inputs so far, constant after that. Raises InputError."""
         known = {
             path: rows[0][1] if len(rows) == 1 else {"table": rows, "smooth": False}
             for path, rows in self._rows.items()

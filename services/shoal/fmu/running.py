@@ -59,13 +59,13 @@ class Variable(NamedTuple):
 class Running:
     """One instance of an exported scene. Its time is the scene's, which begins at 0 s.
 
-    What a host asks for in vain is told in a line, and from then on no step is made, until the unit is reset. The
-    libraries make of every exception a fatal error, after which a host may not even do that and would crash if it went
-    on; only outputs, which are then unknown, still raise one, so that no host takes them for a result.
+    An invalid request is reported in a line, and no further step is made until the unit is reset. The libraries turn
+    every exception into a fatal error, after which a host may not even reset; so only outputs, which are unknown then,
+    raise one: no host takes them for a result.
     """
 
     def __init__(self, folder: str, tell: Callable[[str], None] = lambda line: None) -> None:
-        """folder: that of the resources; tell: where a line for the host's log goes."""
+        """folder: that of the resources; tell: takes a line for the host's log."""
         text = (Path(folder) / CONTENT).read_text(encoding="utf-8")
         content = json.loads(text)
         self.scene = Scene.parse(content["scene"], CONTENT)
@@ -79,7 +79,7 @@ class Running:
 
     @property
     def experiment(self) -> tuple[float, float, float]:
-        """Where it begins and ends, and its communication step, unless somebody says otherwise [s]."""
+        """Return the default start, end and communication step [s]."""
         solver = self.scene.solver
         return 0.0, solver.duration, solver.duration / solver.samples
 
@@ -156,5 +156,5 @@ class Running:
 
 
 def as_dict(variable: Variable) -> dict[str, Any]:
-    """What both libraries take of a variable under the same names."""
+    """Return the attributes of a variable that both libraries share."""
     return {"description": variable.description, "getter": variable.getter, "setter": variable.setter}

@@ -22,7 +22,7 @@ class SceneUnit(Fmi2Slave):  # type: ignore[misc]
     """One instance of an exported scene."""
 
     def __init__(self, **told: Any) -> None:
-        """As pythonfmu calls it; resources: the folder that holds the scene."""
+        """Make an instance for pythonfmu; resources: the folder with the scene."""
         super().__init__(**told)
         self._running = Running(self.resources, lambda line: self.log(line, Fmi2Status.error))
         self._stop: float | None = None
@@ -61,7 +61,7 @@ class SceneUnit(Fmi2Slave):  # type: ignore[misc]
                 real.set("unit", used[name])
 
     def setup_experiment(self, start_time: float, stop_time: float | None, tolerance: float | None) -> None:
-        """Where the experiment ends, if that is known."""
+        """Take the end of the experiment, if it is known."""
         self._running.require_start(start_time)
         self._stop = stop_time
 

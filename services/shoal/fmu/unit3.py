@@ -31,7 +31,7 @@ class SceneUnit3(Fmi3Slave):  # type: ignore[misc]
     """One instance of an exported scene."""
 
     def __init__(self, **told: Any) -> None:
-        """As pythonfmu3 calls it; resources: the folder that holds the scene."""
+        """Make an instance for pythonfmu3; resources: the folder with the scene."""
         super().__init__(**told)
         self._running = Running(self.resources, lambda line: self.log(line, Fmi3Status.error))
         self.guid = self._running.token

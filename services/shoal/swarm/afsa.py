@@ -29,7 +29,7 @@ Which = npt.NDArray[np.bool_]
 
 
 class Stage(IntEnum):
-    """How far a fish is in an iteration: what the point is that it wants to know the food at."""
+    """Stage of a fish in an iteration: the purpose of the point that it asks to be evaluated."""
 
     CENTRE = 0  # the centre of its neighbours
     SWARM = 1  # a step towards it
@@ -192,7 +192,7 @@ class Afsa:
         return self._forage(state, ~social)
 
     def _gone_on(self, state: AfsaState, told: Array) -> AfsaState:
-        """Take each of the fish that were told a value to what it does next."""
+        """Move each fish whose value is known to its next stage."""
         asked = np.zeros(self.size, dtype=bool)
         asked[state.owners] = True
         value = np.full(self.size, np.inf)

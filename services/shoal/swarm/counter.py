@@ -41,7 +41,7 @@ class EvaluationCounter:
         self.best_value = float("inf")
 
     def __call__(self, points: Array) -> Array:
-        """What the function returns for points (n, d). Raises BudgetExhausted before exceeding the budget."""
+        """Evaluate the function at points (n, d). Raises BudgetExhausted before exceeding the budget."""
         points = np.asarray(points, dtype=float)
         if points.ndim != 2:
             raise ValueError(f"points come in batches (n, d), found shape {points.shape}")

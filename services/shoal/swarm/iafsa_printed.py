@@ -1,12 +1,12 @@
 """The improved fish swarm exactly as the paper prints it (section 4.2, eq. 17 and steps 3-1 to 3-7).
 
-What the printed steps mean when they are carried out literally:
+Consequences of the printed steps, carried out literally:
 - Step 3-7 returns to 3-3, which sets P = X: the fish lose their memory, personal and global, in every iteration. In
   eq. 17 p - x is therefore zero and c1 has no effect; p_g is the best of the present swarm only.
   The P_i of step 3-6 are overwritten before anything reads them, so they are not computed.
 - The last term of eq. 17, rho rand() (rand() - x), pulls every fish in every iteration towards a random point of the
-  unit cube [0, 1]^d in the units of the problem (radians), whatever the box. It does not fade, so the swarm keeps
-  stirring and cannot converge by itself; and a solution inside that cube is favoured.
+  unit cube [0, 1]^d in the units of the problem (radians), independent of the box. It does not decay, so the swarm
+  cannot converge by itself; and a solution inside that cube is favoured.
 - Nothing keeps the fish inside the box.
 - With any epsilon > 0 step 3-7 stops at the first iteration in which the best does not move.
 

@@ -1,4 +1,4 @@
-"""The loop around ask and tell."""
+"""Minimisation by an ask-and-tell optimiser."""
 
 from __future__ import annotations
 

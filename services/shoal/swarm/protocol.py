@@ -1,4 +1,4 @@
-"""The one contract of every optimiser: frozen settings that `init`, `ask` and `tell`."""
+"""Interface of all optimisers: frozen settings with `init`, `ask` and `tell`."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ Array = npt.NDArray[np.float64]
 
 
 class State(Protocol):
-    """Where a search stands; never modified, `tell` returns the next one.
+    """State of a search; never modified, `tell` returns the next one.
 
-    best: best point told so far, in the units of the problem, (d,); before any finite value the first candidate
-    best_value: its value, which is the minimum of all values told so far; inf before any finite one
+    best: best point so far, in the units of the problem, (d,); before any finite value the first candidate
+    best_value: its value, which is the minimum of all values so far; inf before any finite one
     iteration: completed iterations; the evaluation of the first swarm is iteration 0, before it stands -1
     finished: whether the method's own stopping rule holds
     """
@@ -35,7 +35,7 @@ S = TypeVar("S", bound=State)
 class Optimizer(Protocol[S]):
     """Minimises a function over a box by asking for its values at candidates.
 
-    The random stream is part of the state: the same state told the same values gives the same next state.
+    The random stream is part of the state: the same state with the same values gives the same next state.
     """
 
     def init(self, rng: np.random.Generator) -> S:

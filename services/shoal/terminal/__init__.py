@@ -1,1 +1,1 @@
-"""What a person sees in a terminal: tables of 80 columns, progress on standard error."""
+"""Output in a terminal: tables of 80 columns, progress on standard error."""

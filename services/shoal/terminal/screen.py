@@ -37,7 +37,7 @@ def show(data: Mapping[str, Any], as_json: bool, draw: Callable[[], None]) -> No
 
 @contextmanager
 def working(what: str) -> Iterator[Callable[[str], None]]:
-    """A spinner beside `what`, or what it is told later, on a terminal; a line for every kernel that is compiled."""
+    """Show a spinner with `what`, or a later text, on a terminal; a line for every kernel that is compiled."""
     if not err.is_terminal:
         with progress.reporting_to(line):
             yield lambda _: None
@@ -56,9 +56,9 @@ def line(text: str) -> None:
 
 
 def compile_for(engine: str, lanes: Iterable[int], *scenes: Scene) -> None:
-    """On all cores, what runs of our own solver will need: one by itself (1), many side by side (2).
+    """Compile the kernels of runs of the native solver on all cores; lanes: 1 for single runs, 2 for batches.
 
-    It is done when the first of them begins, so that nobody waits to hear of a misprint.
+    It begins with the first model, so that errors of the input are reported before.
     """
     if engine == "gauss":
 

@@ -1,4 +1,4 @@
-"""What is found from measured motion, and what to measure."""
+"""Tables of identifications and of experiment designs."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def estimate_table(estimate: Estimate) -> None:
 
 
 def _posterior(estimate: Estimate) -> None:
-    """What draws say of each parameter, and what they are worth."""
+    """Print the posterior of each parameter, with the diagnostics of the sampler."""
     found = estimate.posterior
     if found is None:
         return
@@ -63,7 +63,7 @@ def _posterior(estimate: Estimate) -> None:
 
 
 def _predictions(estimate: Estimate) -> None:
-    """What was held out: how far off the prediction is, and how far off it may be."""
+    """Print the errors of predictions of held-out data, and their predicted standard deviations."""
     if not estimate.prediction:
         return
     table = screen.table("predicted, not fitted", "held out [s]", "channel", "RMS", "limit (95 %)", "inside")
@@ -93,7 +93,7 @@ def _minima(estimate: Estimate) -> None:
 
 
 def _effort(estimate: Estimate) -> None:
-    """Where the data come from, what the search cost, and how the answer compares with a known truth."""
+    """Print the source of the data, the cost of the search and the error where the truth is known."""
     from shoal.pictures.units import fitness_unit, rms_unit
 
     screen.say(f"data: {estimate.data}")

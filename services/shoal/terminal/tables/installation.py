@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def doctor_table(checks: list[Check]) -> None:
-    """What was looked at, and what to do."""
+    """Print the checks of the installation, and what to do."""
     table = screen.table("shoal doctor", "check", "", "found", "what to do")
     for check in checks:
         table.add_row(check.name, "ok" if check.ok else "FAILED", check.found, check.advice)

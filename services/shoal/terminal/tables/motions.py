@@ -28,7 +28,7 @@ _NOTHING = 1e-12
 
 
 def trajectory_table(trajectory: Trajectory, scene: Scene, selection: Selection | None = None) -> None:
-    """Where the markers end, and the evidence."""
+    """Print the final positions of the markers, the checks and the errors."""
     if selection is not None:
         selection_table(selection)
     title = f"{scene.name}, {trajectory.engine}, at t = {trajectory.times[-1]:g} s"
@@ -92,7 +92,7 @@ def sweep_table(sweep: Sweep) -> None:
 
 
 def _short(paths: list[str]) -> list[str]:
-    """Paths with their units, by their last two names where those tell them apart: OA.angle [rad]."""
+    """Paths with their units, by their last two names where those are unique: OA.angle [rad]."""
     from shoal.pictures.units import labelled
 
     ends = [".".join(path.split(".")[-2:]) for path in paths]
@@ -129,7 +129,7 @@ def comparison_table(comparison: Comparison) -> None:
 
 
 def equilibrium_table(equilibrium: Equilibrium) -> None:
-    """Where the markers rest, what the joints bear, and the evidence."""
+    """Print the markers at rest, the joint reactions, the checks and the errors."""
     axes = [f"{axis} [m]" for axis in "xyz"[: equilibrium.scene.dimensions]]
     table = screen.table(f"{equilibrium.scene.name} at rest", "marker", *axes, "angle [rad]")
     for name in equilibrium.markers:
@@ -152,7 +152,7 @@ def equilibrium_table(equilibrium: Equilibrium) -> None:
 
 
 def reactions_table(found: list[Reactions]) -> None:
-    """What every joint exerts on its second body; in space the forces, then the torques."""
+    """Print the reactions of every joint on its second body; in space the forces, then the torques."""
     for reactions in found:
         joints = reactions.joints
         when = f"on the second body at t = {reactions.time:g} s"

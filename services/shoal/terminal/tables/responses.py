@@ -1,4 +1,4 @@
-"""What is known of uncertain machines: bounds or statistics, limits, tolerances, shares of the variance."""
+"""Tables of uncertain machines: bounds or statistics, limits, tolerances, shares of the variance."""
 
 from __future__ import annotations
 
@@ -102,12 +102,12 @@ def response_table(response: Response) -> None:
 
 
 def _by_model(response: Response) -> str:
-    """What the model adds to a gap, in words."""
+    """Describe the part of the model's error in a gap."""
     return "" if response.errors.total is None else f" and the known error of the model, {response.errors.total:.1e} m"
 
 
 def _limit(judged: Judged) -> None:
-    """What is told of a limit, and the values that show it."""
+    """Print the result of a limit, and the values at which it is decided."""
     title, shown, at = judged.limit.title, judged.shown, looked_at(judged.times)
     if judged.between is not None:
         _between(title, judged, judged.between)
@@ -138,7 +138,7 @@ def _limit(judged: Judged) -> None:
 
 
 def _between(title: str, judged: Judged, found: Between) -> None:
-    """Two probabilities and the interval values that they are told at."""
+    """Print two bounds of a probability, and the interval values at which they are attained."""
     (least, largest), (lower, upper) = judged.estimates, found.interval
     screen.say(
         f"{title}: {judged.limit.event} {looked_at(judged.times)} with a probability between {least.told} and "
