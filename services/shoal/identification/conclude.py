@@ -20,7 +20,7 @@ from shoal.identification.judge.turns import with_nearest_turns
 from shoal.identification.judge.verdict import Judgement, Verdict, judge
 from shoal.identification.lengthening import lengthened
 from shoal.identification.methods.growth import FRACTAL, LARGE, growth
-from shoal.identification.methods.lanes import Descent, descend_many
+from shoal.identification.methods.lanes import Descent, descend_many, descend_on
 from shoal.identification.methods.outcome import Outcome
 from shoal.identification.spread import intervals
 from shoal.identification.spread.bootstrap import bootstrap
@@ -85,6 +85,8 @@ def conclude(
     ended = outcome.ended and judgement.verdict is not Verdict.UNFINISHED
     better = judgement.better or (unless_late(lambda: _lower(model, outcome, known.profiled), None) if ended else None)
     if better is not None and rounds > 0:
+        met = better  # as far as a search for something else went
+        better = unless_late(lambda: descend_on(model, met), met)
         return conclude(searched, _moved(outcome, better), method, seed, wall, stages, wishes, rounds - 1)
     point, at, measurement = near.point, near.at, model.measurement
     foretold: list[Prediction] = unless_late(

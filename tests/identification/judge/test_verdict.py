@@ -10,7 +10,9 @@ from shoal.engines import get_engine
 from shoal.identification import Estimate, Measurement, Problem, Verdict, identify, load_problem, measure
 from shoal.identification.conclude import NOTHING, conclude
 from shoal.identification.forward import ForwardModel
+from shoal.identification.judge.verdict import Judgement, judge
 from shoal.identification.methods import Outcome
+from shoal.identification.methods.lanes import descend_each, differentiate_many
 from shoal.identification.methods.least_squares import descend
 from shoal_validation.coverage.cases import NOISE, tip
 from shoal_validation.coverage.cases import noise as correlated
@@ -134,6 +136,25 @@ def test_an_end_that_has_not_converged_is_no_answer() -> None:
     end = descend(model, np.array(list(TRUTH.values())), lambda *_: None)
     outcome = Outcome(end.point, end.fitness, [], "no convergence after 60 iterations", converged=False)
     assert concluded(model, outcome).verdict is Verdict.FAILED
+
+
+def test_a_better_minimum_that_was_met_is_descended_to(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The fits for suspects leave off early: where one is better, its end is the answer, and not where it left off."""
+    model = model_of(problem(1e-3))
+    (met,) = descend_each(
+        [model], [np.array([0.5, 0.9])], lambda _, at: differentiate_many(model, np.array(at)), most=3
+    )
+    asked: list[int] = []
+
+    def judged(*of: Any) -> Judgement:
+        asked.append(1)
+        return judge(*of) if len(asked) > 1 else Judgement(Verdict.FAILED, "a better minimum was met", better=met)
+
+    assert not met.converged
+    monkeypatch.setattr("shoal.identification.conclude.judge", judged)
+    estimate = concluded(model, Outcome(np.array([-0.5, 2.2]), 1.0, [], ""))
+    assert estimate.verdict is Verdict.IDENTIFIED, estimate.message
+    assert all(known.lower <= TRUTH[name] <= known.upper for name, known in estimate.parameters.items())
 
 
 @pytest.mark.slow

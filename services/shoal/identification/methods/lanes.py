@@ -24,6 +24,8 @@ T = TypeVar("T")
 DIFFERENCE = 1e-6
 """Step of the finite differences, relative to the size of a parameter (at least 1e-3 of its range)."""
 _ITERATIONS = 60
+_ROUNDS = 5
+"""Of so many iterations, at most, where a descent that has not converged is followed to its end."""
 _SMALL_STEP = 1e-9
 """Relative to the size of a parameter; a smaller step is the end."""
 _SMALL_GAIN = 1e-8
@@ -76,6 +78,17 @@ def descend_many(
         return list(residuals), list(jacobians)
 
     return _descend(searches, differentiate, progress, patience)
+
+
+def descend_on(model: ForwardModel, end: Descent) -> Descent:
+    """Go on from where a descent left before it had converged, until it has or a round gains nothing."""
+    for _ in range(_ROUNDS):
+        if end.converged:
+            break
+        before, end = end, descend_many(model, end.point[None])[0]
+        if not end.fitness < before.fitness:
+            break
+    return end
 
 
 Differentiate = Callable[[Sequence[int], Sequence[Array]], tuple[Sequence[Array], Sequence[Array]]]
