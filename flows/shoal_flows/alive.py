@@ -1,7 +1,7 @@
-"""Which runs somebody runs: each holds a lock on a file below Shoal's home for as long as its process lives.
+"""Liveness of runs: each run holds a lock on a file below Shoal's home for as long as its process lives.
 
-The system lets go of the lock however the process ends: by a signal, with its container, with the machine. Whoever can
-take the lock knows that nobody runs that run any more, and no clock and no number of a process has to be believed.
+The system releases the lock however the process ends: by a signal, with its container, with the machine. A lock that
+can be taken shows that its run has ended; neither clocks nor process ids are needed.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ WORKER = "SHOAL_WORKER"
 
 @dataclass(frozen=True)
 class Mark:
-    """What is known of a run from outside.
+    """Record of a run for other processes.
 
     kind: MLFLOW or PREFECT; server: the address that knows the run, empty for one of the process's own
     pid: of the process that runs it; worker: which started that, empty if none did
@@ -84,7 +84,7 @@ def settle(end: Callable[[Mark], bool]) -> int:
 
 
 def of_worker(worker: str) -> list[Mark]:
-    """What the flows of a worker run now."""
+    """Return the runs of a worker's flows that are alive."""
     found = []
     for path in _marks():
         with suppress(FileNotFoundError), path.open("a+") as file:
@@ -117,7 +117,7 @@ def _marks() -> list[Path]:
 
 
 def _locked(file: IO[str]) -> bool:
-    """Return whether nobody else had the lock; it is ours until the file is closed."""
+    """Return whether the lock was free; it is held until the file is closed."""
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError:

@@ -107,7 +107,7 @@ def _tolerant() -> Iterator[None]:
 
 
 def address() -> str | None:
-    """That of the server's API: PREFECT_API_URL, else that of the `make up` which uses the same home."""
+    """Return the address of the server's API: PREFECT_API_URL, else that of the `make up` which uses the same home."""
     if stated := os.environ.get("PREFECT_API_URL"):
         return stated.rstrip("/")
     try:

@@ -1,4 +1,4 @@
-"""Where computations run if not in processes of this one: Dask, on this machine or elsewhere, by one setting.
+"""Dask clusters for the computations, on this machine or elsewhere, by one setting.
 
 SHOAL_CLUSTER: empty for worker processes without Dask; `local` or `local:N` for a Dask cluster of N processes on
 this machine; the address of a scheduler, such as tcp://host:8786, for any other.
@@ -21,7 +21,7 @@ _pending: WeakSet[Any] = WeakSet()
 
 
 def setting() -> str:
-    """Which cluster is asked for; empty for none."""
+    """Return the requested cluster; empty for none."""
     return os.environ.get("SHOAL_CLUSTER", "").strip()
 
 

@@ -90,7 +90,7 @@ def report(runs: tuple[str, ...], everything: bool, machine: str | None, out: Pa
 
 @click.command()
 def upload() -> None:
-    """Send MLflow the runs that it could not be told of. They wait in the outbox."""
+    """Send MLflow the runs that wait in the outbox, as it was not reachable when they ended."""
     from shoal_flows.tracking.upload import upload
 
     click.echo(f"{upload()} runs uploaded")

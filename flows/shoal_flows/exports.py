@@ -44,7 +44,7 @@ class Exports:
 
     @property
     def message(self) -> str:
-        """Why it may not."""
+        """Return why it may not be used."""
         return "" if self.motion is None else self.motion.message
 
     def to_json(self) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""What a result depends on, as one short text: the question, the data, the sources and the versions."""
+"""Fingerprints of results: hashes of the request, the data, the sources and the versions."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _SOURCES = (".py", ".yaml", ".j2")
 
 @cache
 def of_code() -> str:
-    """Of every source file of the library and the flows, the versions of what they use, and the processor."""
+    """Hash all source files of library and flows, the versions of their packages, and the processor."""
     digest = hashlib.sha256()
     for folder in (Path(shoal.__file__).parent, Path(__file__).parent):
         for file in sorted(path for path in folder.rglob("*") if path.suffix in _SOURCES):
@@ -31,7 +31,7 @@ def of_code() -> str:
 
 
 def of_cell(cell: Cell, measurement: Measurement) -> str:
-    """Of one optimisation. Raises InputError."""
+    """Hash an optimisation. Raises InputError."""
     problem = load_problem(cell.problem)
     digest = hashlib.sha256(repr((cell, problem.load_scene(cell.values).fingerprint)).encode())
     digest.update(problem.model_dump_json().encode() + measurement.origin.encode())
@@ -44,7 +44,7 @@ def of_cell(cell: Cell, measurement: Measurement) -> str:
 
 
 def of_simulations(what: str, scene: str, values: Mapping[str, Any], *settings: Sequence[Any] | Any) -> str:
-    """Of runs of one scene. Raises InputError."""
+    """Hash runs of one scene. Raises InputError."""
     return _with_code(what, repr((load_scene(scene).with_values(values).fingerprint, settings)))
 
 

@@ -1,4 +1,4 @@
-"""What a flow was given, held on to: a library that changes meanwhile changes neither the study nor its repetition."""
+"""Inputs of a flow, pinned: later changes of the library change neither the study nor its repetition."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def held(parameter: str, kind: str, given: str) -> str:
 
 
 def title(given: str) -> str:
-    """How a scene, a problem or a study is called: by the name that it states, or by that of its file."""
+    """Return the title of a scene, a problem or a study: its stated name, or that of its file."""
     path = Path(given)
     if path.suffix in (".yaml", ".yml"):
         with suppress(OSError, ValueError):
@@ -66,7 +66,7 @@ def _stem(given: str) -> str:
 
 
 def headed(given: str, kind: str) -> str:
-    """The title of a parameter as it was given, YAML among them, before anybody has looked whether it is right."""
+    """Return the title of a parameter as given, YAML included, before it is validated."""
     return ((_stated(given) or _OWN) if "\n" in given else title(located(kind, given)))[:_LONGEST]
 
 
@@ -125,13 +125,13 @@ def _gathered(parameter: str, kind: str, files: Mapping[str, bytes], name: str) 
 
 
 def _said(parameter: str, document: Path, error: InputError) -> str:
-    """What is wrong with a document, by the name of the parameter that holds it in place of its path."""
+    """Return the error of a document, with the name of its parameter in place of the path."""
     text = str(error).replace(str(document), parameter).replace(f"{document.parent}/", "")
     return text if text.startswith(parameter) else f"{parameter}: {text}"
 
 
 def _remember(parameter: str, path: str) -> None:
-    """As the value of the parameter that `tracking.origin` keeps."""
+    """Keep a path as the value of the parameter in `tracking.origin`."""
     from prefect.context import FlowRunContext
 
     context = FlowRunContext.get()

@@ -1,4 +1,4 @@
-"""What the tasks compute: one plain function each, from small descriptions to frozen results."""
+"""Computations of the tasks: one plain function each, from small descriptions to frozen results."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Cell:
 
     @property
     def title(self) -> str:
-        """How the problem is called."""
+        """Return the title of the problem."""
         return inputs.title(self.problem)
 
     @property
@@ -69,7 +69,7 @@ class Fit:
 
     @property
     def motion(self) -> Trajectory:
-        """That of the first recording."""
+        """Return the motion of the first recording."""
         return next(iter(self.motions.values()))
 
 

@@ -16,9 +16,9 @@ UNSTARTED = "never begun: Prefect's worker took this run, and no process began i
 
 
 def end_left() -> int:
-    """End the runs of this home that nobody runs any more; returns how many. What cannot be reached is left for later.
+    """End the orphaned runs of this home, and return their number. Those of unreachable servers are left for later.
 
-    A run that another server knows than those of PREFECT_API_URL and MLFLOW_TRACKING_URI is left to whoever uses that.
+    Runs of servers other than those of PREFECT_API_URL and MLFLOW_TRACKING_URI are left alone.
     """
     settings.apply()
     return alive.settle(_end)

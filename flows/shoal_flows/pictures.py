@@ -45,7 +45,7 @@ Picture = tuple[bytes, bytes]
 
 @dataclass(frozen=True)
 class Album:
-    """What is shown of one optimisation: pictures and draws by the name of their file, the page, and its record."""
+    """Pictures of one optimisation: pictures and draws by the name of their file, the page, and its record."""
 
     pictures: dict[str, bytes]
     page: str
@@ -119,7 +119,7 @@ def draw_convergence(fits: Sequence[Fit], name: str) -> Picture:
 
 
 def draw_residuals(fits: Sequence[Fit], name: str) -> Picture:
-    """What each method leaves."""
+    """Draw the residuals of each method."""
     return _both(remainders(_labelled(fits), titles.leaves(name, _labelled(fits))))
 
 

@@ -1,4 +1,4 @@
-"""What the demo runs: cases, methods, meshes and engines."""
+"""Plan of the demo: cases, methods, meshes and engines."""
 
 from __future__ import annotations
 

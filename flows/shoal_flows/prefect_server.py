@@ -1,6 +1,6 @@
 """Prefect's server behind the checks of Shoal's own: `python -m shoal_flows.prefect_server --port 4200`.
 
-`prefect server start` answers whatever Host and Origin a request names, and its second set of pages asks a host
+`prefect server start` answers any Host and Origin, and its second set of pages asks a host
 elsewhere. Here requests of other origins are refused, websockets included, which CORS does not cover; peers have a
 limited time; and pages are served that may load from and connect to this server alone.
 """

@@ -1,4 +1,4 @@
-"""What a number was computed with: versions, revision of the source, platform."""
+"""Provenance of results: versions, revision of the source, platform."""
 
 from __future__ import annotations
 

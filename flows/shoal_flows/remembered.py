@@ -24,7 +24,7 @@ _NEW, _DAY = ".new-", 86400.0
 def run(key: str, function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
     """The result kept under this key, else that of `workers.run`, which is kept from now on.
 
-    With SHOAL_FRESH set, everything is computed anew.
+    With SHOAL_FRESH set, everything is computed again.
     """
     file = folder() / key
     if not (_fresh or os.environ.get("SHOAL_FRESH")) and (found := _read(file)) is not None:
@@ -37,7 +37,7 @@ def run(key: str, function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -
 
 
 def reused() -> int:
-    """How many results of this process were computed before."""
+    """Return the number of results of this process that were computed before."""
     return len(_reused)
 
 
@@ -53,7 +53,7 @@ def anew() -> Iterator[None]:
 
 
 def folder() -> Path:
-    """Where results are kept, made on demand; whoever can write here can have code run. Raises InputError."""
+    """Return the folder of results, made on demand; write access to it allows running code. Raises InputError."""
     found = home() / "results"
     found.mkdir(mode=0o700, exist_ok=True)
     return found

@@ -43,7 +43,7 @@ class Repeated:
 
     @property
     def complaint(self) -> str:
-        """Why the repetition does not confirm an answer that can be trusted; empty if it does."""
+        """Return why the repetition does not confirm a trusted answer; empty if it does."""
         if self.doubts:
             told = f"the figures {'agree, but are' if self.agree else 'are'} not to be trusted"
             return f"{told}: {'; '.join(self.doubts)}"

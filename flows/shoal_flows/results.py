@@ -1,4 +1,4 @@
-"""What the flows return."""
+"""Results of the flows."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Study:
 
 
 class Answer(Protocol):
-    """What the library found."""
+    """Interface of the library's answers."""
 
     @property
     def ok(self) -> bool:
@@ -64,7 +64,7 @@ class Answer(Protocol):
         ...
 
     def to_json(self) -> dict[str, Any]:
-        """As the library tells it."""
+        """Return the answer as plain data."""
         ...
 
 
@@ -73,7 +73,7 @@ A = TypeVar("A", bound=Answer)
 
 @dataclass(frozen=True)
 class Logged(Generic[A]):
-    """An answer with the id of its run: trusted as the answer is, and told as it is."""
+    """An answer with the id of its run; trusted if the answer is."""
 
     answer: A
     run_id: str
@@ -84,7 +84,7 @@ class Logged(Generic[A]):
         return self.answer.ok
 
     def doubts(self) -> list[str]:
-        """Why not."""
+        """Return why it is not trusted."""
         return list(verdict(self.answer).doubts)
 
     def to_json(self) -> dict[str, Any]:
@@ -106,7 +106,7 @@ class Swept(Logged[Sweep]):
 
 @dataclass(frozen=True)
 class Responded(Logged[Response]):
-    """What an uncertain machine may do."""
+    """Response of an uncertain machine."""
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,7 @@ class Simulated:
         return self.motion.ok
 
     def doubts(self) -> list[str]:
-        """Why not."""
+        """Return why it is not trusted."""
         return list(verdict(self.motion).doubts)
 
     def to_json(self) -> dict[str, Any]:
@@ -149,7 +149,7 @@ class Selected:
         return self.selection.met and self.selection.trajectory.ok
 
     def doubts(self) -> list[str]:
-        """Why not."""
+        """Return why it is not trusted."""
         return list(verdict(self.selection).doubts)
 
     def to_json(self) -> dict[str, Any]:
@@ -159,7 +159,7 @@ class Selected:
 
 @dataclass(frozen=True)
 class Designed(Logged[Design]):
-    """What to measure."""
+    """Design of an experiment."""
 
 
 @dataclass(frozen=True)

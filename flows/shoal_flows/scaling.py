@@ -1,4 +1,4 @@
-"""What a second worker is worth: `python -m shoal_flows.scaling` times a sweep of 20 000 simulations on Dask."""
+"""Strong scaling of workers: `python -m shoal_flows.scaling` times a sweep of 20 000 simulations on Dask."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ REPEATS = 5
 
 @dataclass(frozen=True)
 class Cost:
-    """Of a sweep [s]: wall time, and processor time of the workers, which other programs lengthen less."""
+    """Cost of a sweep [s]: wall time, and processor time of the workers, which other programs lengthen less."""
 
     wall: float
     processor: float
 
 
 def cost(number: int) -> Cost:
-    """The best of a few sweeps on a local cluster of so many workers, which are warm."""
+    """Return the best of a few sweeps on a local cluster of warm workers."""
     os.environ["SHOAL_CLUSTER"] = f"local:{number}"
     cluster.client.cache_clear()
     client = cluster.client()

@@ -71,7 +71,7 @@ def stop() -> None:
 class _Kept:
     """The process of a server, and a thread that starts another whenever it ends by itself.
 
-    settled: whether it is known if it answers at all; lost: whether nobody answers any more.
+    settled: whether its first answer or failure is known; lost: whether it answers no more.
     """
 
     def __init__(self) -> None:

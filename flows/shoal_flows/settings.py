@@ -60,12 +60,12 @@ def guarded(port: int | str) -> dict[str, str]:
 
 
 def artifact_folder() -> Path:
-    """Where artifacts lie unless an MLflow server keeps them."""
+    """Return the folder of artifacts, unless an MLflow server keeps them."""
     return home() / "artifacts"
 
 
 def log_folder() -> Path:
-    """Where the servers write what they have to say; made on demand."""
+    """Return the folder of the servers' logs, made on demand."""
     folder = home() / "logs"
     folder.mkdir(exist_ok=True)
     return folder

@@ -1,4 +1,4 @@
-"""What a person sees while a flow runs and when it has ended: progress on standard error, one table on the output."""
+"""Terminal output of a flow: progress on standard error, one table on the output."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ def show(result: Any) -> None:
 
 
 def notice() -> None:
-    """Say on standard error what was not computed now, and what MLflow has not been told, where something is."""
+    """Print on standard error which results were reused, and which runs MLflow still lacks."""
     console = Console(stderr=True, highlight=False)
     if count := remembered.reused():
         console.print(f"{count} results were computed before; SHOAL_FRESH=1 computes them anew", soft_wrap=True)

@@ -1,4 +1,4 @@
-"""What became of an answer, for MLflow, Prefect and the terminal alike: a word, and why it cannot be trusted."""
+"""Verdicts for MLflow, Prefect and the terminal: a word, and the reasons against an answer."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Verdict(NamedTuple):
 
 @singledispatch
 def verdict(answer: Any) -> Verdict:
-    """Of whatever a flow finds. Raises TypeError for what is no answer."""
+    """Return the verdict on an answer of a flow. Raises TypeError for other objects."""
     raise TypeError(type(answer).__name__)
 
 

@@ -1,4 +1,4 @@
-"""Processes for the computations, so that optimisations run side by side whatever holds the interpreter's lock."""
+"""Worker processes for the computations: optimisations run in parallel, independent of the interpreter's lock."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Pending(Protocol[T_co]):
     """A computation that was asked for."""
 
     def result(self) -> T_co:
-        """What it gave; an exception of the function is raised here."""
+        """Return the result; an exception of the function is raised here."""
         ...
 
 

@@ -42,7 +42,11 @@ def test_a_study_is_started_from_prefects_form_and_answers_there(desk: Any, visi
     page.get_by_role("link", name="identify").first.click()
     page.get_by_role("button", name="Run", exact=True).first.click()
     page.get_by_text("Custom run").click()
-    for words in ("What is measured and what is to be found", "How to search", "empty for the data of the problem"):
+    for words in (
+        "Measured channels and unknown parameters",
+        "Methods of the search",
+        "empty for the data of the problem",
+    ):
         expect(page.get_by_text(words)).to_be_visible()
     page.get_by_role("button", name="by name").first.click()
     assert set(choose(page, "", "paper-case-1")) == set(problem_names())

@@ -1,4 +1,4 @@
-"""Who is told of a night that is not as it should be: an automation of Prefect's, set by $SHOAL_ALERT alone."""
+"""Alerts of failed nights: an automation of Prefect's, set by $SHOAL_ALERT alone."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def whom(url: str) -> Receiver | None:
 
 
 def state(receiver: Receiver | None) -> None:
-    """Have the server of PREFECT_API_URL tell this receiver, and nobody else any more."""
+    """Make this receiver the only one of the server of PREFECT_API_URL."""
     from prefect.client.orchestration import get_client
 
     with get_client(sync_client=True) as client:

@@ -1,4 +1,4 @@
-"""`python -m shoal_flows.deployment.deploy`: tells Prefect's server what it may run, and whom to tell of bad nights."""
+"""`python -m shoal_flows.deployment.deploy`: deploys the flows to Prefect's server, with alerts of failed nights."""
 
 from __future__ import annotations
 

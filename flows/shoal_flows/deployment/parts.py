@@ -1,4 +1,4 @@
-"""What runs together: each part is started, looked after, and started again when it ends by itself."""
+"""Supervision of processes: each is started, watched, and restarted when it ends by itself."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ _GRACE = 20.0
 
 
 class Part(Protocol):
-    """A program that others need, or that somebody waits for."""
+    """A supervised program."""
 
     @property
     def name(self) -> str:
-        """As the Procfile calls it."""
+        """Return its name in the Procfile."""
         ...
 
     @property
@@ -64,7 +64,7 @@ class Line:
         return processes.NEEDS.get(self.name, ())
 
     def begin(self) -> None:
-        """Start it without waiting. Raises InputError if what is left of the one before still listens."""
+        """Start it without waiting. Raises InputError if a process of an earlier start still listens."""
         self.stop()
         processes.check_port(self.name)
         self._process = subprocess.Popen(

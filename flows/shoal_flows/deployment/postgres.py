@@ -1,4 +1,4 @@
-"""A PostgreSQL server of one's own below Shoal's home: made on first use, on a loopback port, behind a password."""
+"""A private PostgreSQL server below Shoal's home: made on first use, on a loopback port, behind a password."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class Postgres:
         return True
 
     def stop(self) -> None:
-        """End it, whatever is connected."""
+        """Stop it; open connections are closed."""
         if not self.ended():
             _run("pg_ctl", "stop", "-w", "-m", "fast", "-D", str(self._data))
 
@@ -97,7 +97,7 @@ def _make_databases(port: int, password: str) -> None:
 
 
 def _user() -> str:
-    """Who runs the server: PostgreSQL refuses to run as root."""
+    """Return the user that runs the server: PostgreSQL refuses to run as root."""
     if os.getuid() != 0:
         return pwd.getpwuid(os.getuid()).pw_name
     names = {entry.pw_name for entry in pwd.getpwall()}

@@ -65,7 +65,7 @@ def run(stages: Sequence[Sequence[str]], *, postgres: bool = False) -> None:
 
 
 def environment_of(stores: Mapping[str, str]) -> dict[str, str]:
-    """What every process sees: state below the home, the addresses of both servers, the programs of this Python."""
+    """Return the environment of every process: home, addresses of both servers, programs of this Python."""
     folder = home()
     stated = {
         "SHOAL_HOME": str(folder),

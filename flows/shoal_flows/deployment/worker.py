@@ -1,7 +1,7 @@
 """`python -m shoal_flows.deployment.worker ARGS`: `prefect worker start ARGS` that leaves no run standing as "running".
 
-What an earlier worker left behind is ended first. When this one is told to stop, so are its flows, which then end their
-runs; Prefect's worker would kill them without a word.
+Runs left by an earlier worker are ended first. When this one is stopped, its flows are stopped too and end their runs;
+Prefect's worker would kill them.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _EVERY, _STARTS = 30.0, 300.0
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Run a worker until it ends or this process is told to; returns the exit status."""
+    """Run a worker until it ends or this process is stopped; return the exit status."""
     try:
         settings.apply()
         if ended := end_left():

@@ -26,13 +26,13 @@ def design(
     parameter: str | None = None,
     values: Values = {},  # noqa: B006 - Prefect shows the default in its form; nothing changes it
 ) -> Designed:
-    """Rank what could be measured by how well it would tell the parameters of a problem.
+    """Rank possible measurements by the information that they give about the parameters of a problem.
 
     Args:
-        problem: What is to be found: a name (see `shoal problems`), or its YAML.
+        problem: The parameters: a name (see `shoal problems`), or its YAML.
         data: A recording: a name of the library, a path where the worker runs, or the address of one in a service's
             library; empty for the data of the problem.
-        about: About what the data tell, or about the start; else the first, where there are data.
+        about: About the answer of the data, or about the start; else the first, where there are data.
         noise: Standard deviation of positions [m]; else the problem's.
         angle_noise: Standard deviation of angles [rad]; else the problem's.
         sensor_noise: Of sensors on the machine that are weighed too, in SI units, as {sensor: size}, such as

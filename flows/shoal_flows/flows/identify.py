@@ -35,18 +35,18 @@ def identify(
     """Find the parameters of a problem from measured motion, by every method with every seed.
 
     Args:
-        problem: What is measured and what is to be found from it: a name (see `shoal problems`), or its YAML.
-        methods: How to search; auto takes what suits the problem.
+        problem: Measured channels and unknown parameters: a name (see `shoal problems`), or its YAML.
+        methods: Methods of the search; auto chooses by the problem.
         seeds: Of the random numbers; every method runs once with each.
         data: A recording: a name of the library, a path where the worker runs, or the address of one in a service's
             library; empty for the data of the problem.
-        engine: Who simulates; gauss is Shoal's own solver.
+        engine: Engine of the simulations; gauss is Shoal's own solver.
         values: Fields of the scene to set, as {path: value}, such as {"bodies.OA.elements": 8}.
         tolerance: Error in m that the model may have at the markers; elements, integrator and step are chosen for it;
             0 for the scene's own.
         hold_out: Windows in s that are predicted instead of fitted, such as 0.3 to 0.4, 0.7 to 0.8; empty for those of
             the recording.
-        sample: Draws from the posterior until so many are effective; 0 for none.
+        sample: Effective sample size of draws from the posterior; 0 for none.
     """
     for method in methods:
         get_method(method)

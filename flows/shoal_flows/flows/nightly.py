@@ -81,7 +81,7 @@ def _changes(night: Night) -> str:
 
 
 def _table(night: Night) -> str:
-    """What is not as it should be first."""
+    """Return the table of a night, failures first."""
     lines = sorted(night.lines, key=lambda line: line.verdict.fine)
     rows = ((line.verdict, line.problem, line.engine, line.method, line.expected, line.found) for line in lines)
     return table(("verdict", "problem", "engine", "method", "expected", "found"), rows)

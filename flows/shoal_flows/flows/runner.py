@@ -1,4 +1,4 @@
-"""How many tasks of a flow run at a time: as many as there are worker processes, or enough to keep a cluster busy."""
+"""Concurrency of the tasks of a flow: the number of worker processes, or enough to keep a cluster busy."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What Prefect's pages show of a flow: its result as a table, the way to its run in MLflow, how far it is."""
+"""Artifacts of a flow on Prefect's pages: its result as a table, the link to its run in MLflow, its progress."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from shoal_flows.tracking.record import LOCAL
 
 
 class Result(Protocol):
-    """What a flow returns."""
+    """Interface of the results of flows."""
 
     @property
     def trusted(self) -> bool:
@@ -31,7 +31,7 @@ class Result(Protocol):
 
     @property
     def run_id(self) -> str:
-        """Of its run in MLflow."""
+        """Return the id of its run in MLflow."""
         ...
 
     def doubts(self) -> list[str]:
@@ -43,7 +43,7 @@ R = TypeVar("R", bound=Result)
 
 
 def ended(result: R) -> R:
-    """What a flow returns; one that cannot be trusted with a state of that name, and every reason in one line."""
+    """Return the result of a flow; an untrusted one sets a state of that name, with every reason in one line."""
     if result.trusted:
         return result
     # Prefect takes the state, and whoever called the flow gets the result in it.
@@ -73,7 +73,7 @@ def _where(run_id: str) -> str:
 
 
 def named(flow: str, parameter: str) -> Callable[[], str]:
-    """How the runs of a flow are called: by the title of what it was given."""
+    """Return the name of runs of a flow: the title of its input."""
     kind = {one.one: folder for folder, one in KINDS.items()}[parameter]
 
     def name() -> str:
@@ -96,16 +96,16 @@ class Bar:
         self.stand_at(self._done + 1)
 
     def stand_at(self, done: int) -> None:
-        """So many are done."""
+        """Show this number as done."""
         self._done = done
         update_progress_artifact(self._artifact, 100.0 * done / self._total)
 
 
 @contextmanager
 def progress(total: int, description: str) -> Iterator[Bar]:
-    """A bar that stands at the end when the block is left without an exception.
+    """Show a progress bar, complete when the block ends without an exception.
 
-    A flow that is told to stop does not wait for what it has others compute: it would be killed meanwhile.
+    A flow that is stopped does not wait for its tasks: it would be killed meanwhile.
     """
     bar = Bar(total, description)
     try:

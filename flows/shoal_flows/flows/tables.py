@@ -22,7 +22,7 @@ _ROWS = 50
 
 
 def of_motion(motion: Trajectory) -> str:
-    """Where the markers end if the motion is believed, and the evidence."""
+    """Return the final positions of the markers of an accepted motion, and its checks."""
     ends = [(name, *motion.marker(name)[-1]) for name in motion.markers]
     shown = table(("marker", *_places(motion.axes)), ends) if motion.ok else "No places are shown, as it is rejected."
     evidence = f"{motion.status[0]}; energy drift {motion.energy_drift[0]:.1e}, constraint drift "
@@ -32,7 +32,7 @@ def of_motion(motion: Trajectory) -> str:
 
 
 def of_comparison(comparison: Comparison) -> str:
-    """How far each pair of engines is apart."""
+    """Return the distance of each pair of engines."""
     rows = [("-".join(row["engines"]), row["marker"], row["largest"], row["final"]) for row in comparison.differences()]
     rows += [(engine, "refused", reason, "") for engine, reason in comparison.refused.items()]
     shown = table(("engines", "marker", "largest distance [m]", "distance at the end [m]"), rows)
@@ -53,7 +53,7 @@ def of_sweep(result: Sweep) -> str:
 
 
 def of_response(found: Response) -> str:
-    """Bounds or statistics of every marker at the end, what is told of the limits, and the evidence."""
+    """Return bounds or statistics of every marker at the end, the limits, and the checks."""
     header, rows = found.table()
     brief = ("mean_lower", "mean_upper", "std_lower", "std_upper") if found.boxes is not None else ()
     ends: dict[str, dict[str, float]] = {}
@@ -80,7 +80,7 @@ def of_response(found: Response) -> str:
 
 
 def of_equilibrium(found: Equilibrium) -> str:
-    """Where the markers rest, and the evidence."""
+    """Return the markers at rest, and the checks."""
     rows = [(name, *found.marker(name), found.angle(name)) for name in found.markers]
     evidence = f"{found.status}, {found.errors.brief}; {found.residual:.1e} of the forces is not balanced, "
     evidence += f"{found.iterations} iterations"
@@ -98,14 +98,14 @@ def of_selection(found: Selection) -> str:
 
 
 def of_exports(found: Exports) -> str:
-    """What was written, and how far the tools' motions are from Shoal's."""
+    """Return the files written, and the distance of each tool's motion from Shoal's."""
     shown = table(("file", "bytes"), ((name, len(content)) for name, content in found.files.items()))
     told = (f"{tool}: its motion is within {distance:.2g} m of Shoal's" for tool, distance in found.distances.items())
     return "\n\n".join([shown, *told])
 
 
 def of_design(found: Design) -> str:
-    """What could be measured, the best first: how well it would tell every parameter."""
+    """Return the possible measurements, the best first, with the standard deviation of every parameter."""
     rows = [(sensor.label, *precision.std) for sensor, precision in found.ranked]
     return table(("sensor", *(f"std of {name}" for name in found.aim.names)), [("today", *found.now.std), *rows])
 

@@ -76,7 +76,7 @@ def simulate(scene: str, engine: str, values: Mapping[str, Any]) -> tuple[Scene,
 
 @task(task_run_name="statics", cache_policy=NO_CACHE)
 def at_rest(scene: str, time: float, tolerance: float | None, values: Mapping[str, Any]) -> tuple[Equilibrium, str]:
-    """Where a scene comes to rest, with the id of its run."""
+    """Return the equilibrium of a scene, with the id of its run."""
     name = inputs.title(scene)
     with events.work(f"{name} at rest"):
         with or_failed("Statics", f"{name} · statics", {"kind": "statics", "scene": name}):
@@ -97,7 +97,7 @@ def select(scene: str, tolerance: float, values: Mapping[str, Any]) -> tuple[Sel
 
 @task(task_run_name="design", cache_policy=NO_CACHE)
 def plan(problem: str, data: str | None, how: Mapping[str, Any]) -> tuple[Design, str]:
-    """What to measure, with the id of its run."""
+    """Return the design of an experiment, with the id of its run."""
     name = inputs.title(problem)
     with events.work(f"a measurement for {name}"):
         with or_failed("Design", f"{name} · design", {"kind": "design", "problem": name}):
@@ -107,7 +107,7 @@ def plan(problem: str, data: str | None, how: Mapping[str, Any]) -> tuple[Design
 
 @task(task_run_name="uncertain", cache_policy=NO_CACHE)
 def respond(study: str, values: Mapping[str, Any]) -> tuple[Response, str]:
-    """How a machine may move whose parameters are uncertain, with the id of its run."""
+    """Return the response of a machine with uncertain parameters, with the id of its run."""
     name = inputs.title(study)
     with events.work(f"{name}: uncertain response"):
         with or_failed("Uncertain", f"{name} · uncertain", {"kind": "uncertain"}):

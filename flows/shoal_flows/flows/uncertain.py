@@ -17,10 +17,10 @@ def uncertain(
     study: StudyName = "pendulum-tolerances",
     values: Values = {},  # noqa: B006 - Prefect shows the default in its form; nothing changes it
 ) -> Responded:
-    """Find bounds or statistics of a machine with uncertain parameters, and what becomes of its limits.
+    """Find bounds or statistics of a machine with uncertain parameters, and whether its limits hold.
 
     Args:
-        study: What is asked: a name of the library, or YAML `uncertain` with a scene, what varies and other options
+        study: A name of the library, or YAML `uncertain` with a scene, what varies and other options
             of `shoal uncertain`. Its files are artifacts of the run in MLflow.
         values: Fields of the scene to set, as {path: value}, such as {"bodies.OA.elements": 8}.
     """

@@ -34,7 +34,7 @@ _TRUSTED = "identified"
 class Study:
     """One study. values: (value, lower, upper) by parameter, interval nan where none was kept; started [s].
 
-    data: what tells the recordings that it was fitted to, in whole or in part, from others.
+    data: identifies the recordings that it was fitted to, in whole or in part.
     """
 
     run_id: str
@@ -122,7 +122,7 @@ def _runs(client: Any) -> Iterator[Any]:
 
 
 def independent(studies: Sequence[Study]) -> list[Study]:
-    """Of trusted studies those that share no recording, oldest first: the same samples again are no new evidence.
+    """Return the trusted studies that share no recording, oldest first: the same samples again are no new evidence.
 
     Of several of the same recordings the newest counts, at the time when these were first studied, which is the nearest
     to their measurement; of others that overlap that of fewer recordings. One without known data does not count.
@@ -217,7 +217,7 @@ def _drawn(name: str, studies: Sequence[Study]) -> Drawn:
 
 
 def words(name: str, line: Drift | None, count: int) -> str:
-    """What a chart says; count: of recordings."""
+    """Describe a chart in words; count: of recordings."""
     if line is None:
         some = f"{count} recording" + ("s" if count != 1 else "")
         return f"{name}: {some} with a trusted study, too few to tell a drift"

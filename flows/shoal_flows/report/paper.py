@@ -1,4 +1,4 @@
-"""What the paper prints in its tables 2 and 3, misprint included (0.7584 where its text says 0.7854)."""
+"""Values of the paper's tables 2 and 3, misprint included (0.7584 where its text says 0.7854)."""
 
 from __future__ import annotations
 

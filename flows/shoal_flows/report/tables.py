@@ -63,7 +63,7 @@ def engine_rows(compared: Compared) -> list[list[str]]:
 
 
 def commands(case: str, scene: str, study: Study, compared: Compared) -> list[list[str]]:
-    """What to type for each number."""
+    """Return the command for each number."""
     rows = [
         [f"{fit.cell.method}", f"shoal identify {case} --method {fit.cell.method} --seed {fit.cell.seed}"]
         for fit in study.fits

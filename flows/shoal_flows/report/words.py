@@ -37,7 +37,7 @@ def largest_distance(compared: Compared) -> float:
 
 
 def identified(title: str, study: Study) -> str:
-    """What was identified and how exactly, by least squares."""
+    """Describe the identified values and their accuracy, by least squares."""
     fit = study.by_method().get("least-squares")
     if fit is None:
         return f"{title}: least squares failed ({next(iter(study.failures.values()), 'no reason given')})."
@@ -52,7 +52,7 @@ def identified(title: str, study: Study) -> str:
 
 
 def against_swarms(title: str, study: Study) -> str:
-    """What the swarms do beside least squares."""
+    """Describe the swarms in comparison with least squares."""
     fits = study.by_method()
     if not {"iafsa", "iafsa-unseeded", "afsa", "iafsa-printed", "least-squares"} <= set(fits):
         return f"{title}: not every swarm ended."
@@ -74,7 +74,7 @@ def _outside(fit: Fit) -> str:
 
 
 def same_mesh(title: str, study: Study) -> str:
-    """What remains if the data come from the mesh that is fitted."""
+    """Describe the residual if the data come from the mesh that is fitted."""
     fit = study.by_method().get("least-squares")
     if fit is None:
         return f"{title}: least squares failed on data of its own mesh."
@@ -86,7 +86,7 @@ def same_mesh(title: str, study: Study) -> str:
 
 
 def like_with_like(title: str, case: str, same: Study, study: Study) -> str:
-    """What the paper's swarms reach on data of the fitted mesh, beside what it prints, and on data of a finer model."""
+    """Describe the accuracy of the paper's swarms on data of the fitted mesh, as printed, and of a finer model."""
     on_own, on_other = same.by_method(), study.by_method()
     methods = {method: f"{NAMES[row]} {kind}" for row, kinds in AS.items() for method, kind in kinds.items()}
     if not set(methods) <= set(on_own) & set(on_other):
@@ -101,7 +101,7 @@ def like_with_like(title: str, case: str, same: Study, study: Study) -> str:
 
 
 def confirmed(title: str, compared: Compared, study: Study) -> str:
-    """Which engines confirm."""
+    """Describe which engines confirm the result."""
     names = list(compared.answer.trajectories)
     text = (
         f"{title}: {', '.join(names[:-1])} and {names[-1]} put the tip of the paper's 2/4 mesh within "
@@ -116,7 +116,7 @@ def confirmed(title: str, compared: Compared, study: Study) -> str:
 
 
 def mesh_sentence(title: str, study: Study) -> str:
-    """What the mesh does, coarsest against finest."""
+    """Describe the effect of the mesh, coarsest against finest."""
     if len(study.fits) < 2:
         return f"{title}: the meshes could not be compared."
     coarse, fine = study.fits[0], study.fits[-1]

@@ -1,1 +1,1 @@
-"""What is logged to MLflow, one file for each kind of result."""
+"""Logging to MLflow, one file for each kind of result."""

@@ -1,4 +1,4 @@
-"""Where a browser finds runs: the page of one, and the table of its kind with the columns that matter."""
+"""Addresses of runs for a browser: the page of one, and the table of its kind with the main columns."""
 
 from __future__ import annotations
 

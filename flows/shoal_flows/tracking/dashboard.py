@@ -1,7 +1,7 @@
 """MLflow's server with pages that open on runs and metrics: `mlflow server --app-name shoal`.
 
-They open on traces of language models until the browser remembers something else. So it is told once, where it
-remembers nothing: whoever chooses otherwise stays with that. MLflow's assistant, which runs commands of the server's
+They open on traces of language models until the browser remembers something else. A page sets it once, where the
+browser remembers nothing: later choices of users are kept. MLflow's assistant, which runs commands of the server's
 user, and its gateway to language models elsewhere are switched off. Requests of other origins are refused, also those
 of other ports of this machine, which MLflow lets in. MLflow's own check of hosts, whose default `10.*` is met by
 10.evil.example, compares with the names of this server.

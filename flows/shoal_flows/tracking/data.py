@@ -1,4 +1,4 @@
-"""Recordings as MLflow's data sets: runs on the same samples have the same digest, wherever these came from."""
+"""Recordings as MLflow's data sets: runs on the same samples have the same digest, independent of their source."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def _of(name: str, recording: Recording) -> Data:
 
 
 def _digest(recording: Recording, *held: Held) -> str:
-    """Of the samples of a recording, and of what is held out, in the order of time."""
+    """Hash the samples of a recording and the held-out windows, in the order of time."""
     parts: list[Recording | Held] = [recording, *held]
     times = np.concatenate([part.times for part in parts])
     values = np.concatenate([part.values for part in parts])
@@ -61,12 +61,12 @@ def _digest(recording: Recording, *held: Held) -> str:
 
 
 def whole(digest: str, source: str) -> str:
-    """What tells a recording from others, whatever part of it was fitted: from what MLflow has of a data set."""
+    """Return the key of a recording, independent of the fitted part, from MLflow's record of a data set."""
     return str(json.loads(source).get("tags", {}).get(_WHOLE, digest))
 
 
 def inputs(data: list[Data]) -> list[object]:
-    """As MLflow's client takes them."""
+    """Return the data sets for MLflow's client."""
     from mlflow.entities import Dataset, DatasetInput, InputTag
 
     used = [InputTag(_CONTEXT, "identification")]

@@ -81,7 +81,7 @@ def log_sweep(result: Sweep) -> str:
 
 
 def log_motion_of(run: Run, scene: Scene, motion: Trajectory, selection: Selection | None = None) -> None:
-    """What was computed of a scene, and where its markers went if places may be told; selection: of its model."""
+    """Log the model of a scene, and the trajectories of its markers if accepted; selection: of its model."""
     kept = (item for item in motion.model.items() if not item[0].startswith(("initial", "verification", "errors")))
     made = {f"model.{name}": value for name, value in kept}
     run.params({**stated(scene), "engine": motion.engine, **made})
@@ -106,7 +106,7 @@ def log_errors(run: Run, errors: ErrorBudget) -> None:
 
 
 def stated(scene: Scene) -> dict[str, Any]:
-    """Which scene it is."""
+    """Return the parameters that identify a scene."""
     return {"scene": scene.name, "scene.fingerprint": scene.fingerprint, "step": scene.solver.step}
 
 

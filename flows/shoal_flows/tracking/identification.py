@@ -36,7 +36,7 @@ def open_study(name: str, cells: Sequence[Cell], measurement: Measurement) -> It
 
 
 def log_outcome(study: Run, fits: Sequence[Fit], failures: Mapping[str, str], pictures: Mapping[str, bytes]) -> None:
-    """What the study found, over all its fits; failures: what went wrong, by the name of the cell."""
+    """Log the outcome of a study over all its fits; failures: messages by the name of the cell."""
     study.metric("study/trusted", sum(f.estimate.verdict.trusted for f in fits))
     study.metric("study/failed", len(failures))
     for name, picture in pictures.items():

@@ -24,7 +24,7 @@ def log_motion(
 ) -> None:
     """Metrics `tip/x` and so on of a marker by ms, its name as the setting `tip`, and `trajectory.csv` of all markers.
 
-    told: whether its places may be told; where not, there are no metrics, and the name of the file says so
+    told: whether the motion is accepted; otherwise there are no metrics, and the name of the file says so
     """
     marker, name = tip(motion.markers, measured), "trajectory.csv" if told else "trajectory-rejected.csv"
     run.params({f"{prefix}tip": marker})

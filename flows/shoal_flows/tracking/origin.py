@@ -1,4 +1,4 @@
-"""What a study was asked for, kept with its run, so that it can be repeated from there alone."""
+"""Request of a study, kept with its run, from which it can be repeated."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Runs that MLflow could not be told of: kept below Shoal's home until it can."""
+"""Outbox: runs that could not be sent to MLflow, kept below Shoal's home."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _IDS = "ids.json"
 
 
 def folder() -> Path:
-    """Where they are kept, made on demand. Raises InputError."""
+    """Return their folder, made on demand. Raises InputError."""
     found = home() / "outbox"
     found.mkdir(exist_ok=True)
     return found
@@ -38,7 +38,7 @@ def pending() -> list[Path]:
 def upload(make: Callable[[Run], None], send: Callable[[Run], None]) -> int:
     """Send what waits and forget it; returns how many were sent.
 
-    make: gives a run its id of MLflow; send: tells all of it; what they raise ends the upload, and nothing is lost.
+    make: gives a run its id of MLflow; send: sends all of it; an exception ends the upload, and nothing is lost.
     """
     with _alone() as alone:
         return sum(_upload(where, make, send) for where in pending()) if alone else 0

@@ -71,12 +71,12 @@ class Run:
         return not self.run_id.startswith(LOCAL)
 
     def describe(self, text: str) -> None:
-        """What MLflow shows as the run's description (Markdown); what is too long for it is cut."""
+        """Set the run's description in MLflow (Markdown), cut to the allowed length."""
         if text:
             self.tags[_NOTE] = text[:_LONGEST]
 
     def judge(self, word: str, doubts: Sequence[str] = (), says: str = "Not to be trusted") -> None:
-        """What became of it, as tag `verdict`; doubts: every reason not to trust it, which begin the description."""
+        """Set the tag `verdict`; doubts: every reason not to trust the run, at the beginning of the description."""
         self.tags["verdict"] = word
         if doubts:
             self.describe(f"**{says}:** {'; '.join(doubts)}\n\n{self.tags.get(_NOTE, '')}".strip())
@@ -128,7 +128,7 @@ class Run:
 
     @classmethod
     def load(cls, folder: Path) -> Self:
-        """What `save` wrote. Raises OSError, ValueError."""
+        """Load a record written by `save`. Raises OSError, ValueError."""
         data = json.loads((folder / _TEXT).read_text(encoding="utf-8"))
         data["metrics"] = [(name, value, when, step) for name, value, when, step in data["metrics"]]
         if stated := data.get("registration"):

@@ -90,7 +90,7 @@ def open_run(
 
 @contextmanager
 def or_failed(experiment: str, name: str, tags: Mapping[str, str]) -> Iterator[None]:
-    """What is computed within the block and logged after it: where it fails, there is a failed run with the reason."""
+    """Log a failed run with the reason where the block fails."""
     try:
         yield
     except Exception as error:
@@ -107,7 +107,7 @@ def upload() -> int:
 
 @contextmanager
 def answering() -> Iterator[None]:
-    """What is asked of MLflow within the block. Raises ComputationError where it does not answer."""
+    """Turn errors of MLflow's server within the block into ComputationError."""
     try:
         yield
     except _failures() as error:
@@ -188,7 +188,7 @@ def _send(run: Run) -> None:
 
 
 def _failures() -> tuple[type[Exception], ...]:
-    """What a server that is down, or a database that cannot be read or written, leads to."""
+    """Return the exceptions of a server that is down, or of a database that cannot be read or written."""
     from mlflow.exceptions import MlflowException
     from sqlalchemy.exc import SQLAlchemyError
 
@@ -230,7 +230,7 @@ def _unreachable(error: Exception) -> ComputationError:
 
 @cache
 def _experiment(address: str, name: str) -> str:
-    """That of MLflow at an address, looked at when it is first used."""
+    """Return the id of an experiment of MLflow at an address, cached."""
     return experiment(_client(address), name)
 
 

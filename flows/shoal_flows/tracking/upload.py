@@ -1,4 +1,4 @@
-"""`shoal upload`: tell MLflow of the runs that it could not be told of when they ended."""
+"""`shoal upload`: send MLflow the runs that it lacks."""
 
 from __future__ import annotations
 

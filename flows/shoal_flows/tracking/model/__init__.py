@@ -1,1 +1,1 @@
-"""What was identified as a model of MLflow: its files, what it computes, and when it becomes the champion."""
+"""Identified machines as MLflow models: files, predictor, and promotion to champion."""

@@ -19,9 +19,9 @@ ACCURACY = 1e-4
 
 @dataclass(frozen=True)
 class Confirmation:
-    """What a second engine says of the signals that were fitted.
+    """Confirmation of the fitted signals by a second engine.
 
-    signal: where the engines differ most for what is allowed; away, allowed: root mean square there, in its unit
+    signal: with the largest difference relative to the allowed one; away, allowed: root mean square there, in its unit
     refusal: why there is no answer, else empty
     """
 

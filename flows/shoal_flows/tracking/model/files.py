@@ -106,7 +106,7 @@ def _only(sources: dict[str, dict[str, Any]]) -> dict[str, Any]:
 
 
 def _source(name: str, recording: Recording) -> dict[str, Any]:
-    """How the samples of `_table` are read: in SI units, from the start of the motion, by the recording's clock."""
+    """Describe the columns of `_table`: in SI units, from the start of the motion, by the recording's clock."""
     channels = []
     read = {"column", "origin", "unit", "scale", "offset", "noise"}
     for channel, column, noise in zip(recording.channels, _columns(recording), recording.noise.tolist(), strict=True):

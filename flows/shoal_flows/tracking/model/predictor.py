@@ -1,4 +1,4 @@
-"""What a registered model computes: the motion of an identified machine. MLflow keeps this file with every model."""
+"""Predictor of a registered model: the motion of an identified machine. MLflow keeps this file with every model."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ from shoal_flows.tracking.record import MODEL, Registration, Run
 
 
 def register(study: Run, fits: Sequence[Fit]) -> None:
-    """Put the best fit into a run as a model, which enters the registry when MLflow is told of the run.
+    """Put the best fit into a run as a model, which enters the registry when the run is sent to MLflow.
 
     The best is the best of those that can be trusted, else of all; nothing happens without a fit.
     """
@@ -29,7 +29,7 @@ def register(study: Run, fits: Sequence[Fit]) -> None:
 
 
 def confirmed(fit: Fit) -> Confirmation:
-    """What a second engine says of a fit."""
+    """Confirm a fit by a second engine."""
     return confirm(Answer(load_problem(fit.cell.problem), fit.estimate))
 
 

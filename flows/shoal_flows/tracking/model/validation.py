@@ -1,4 +1,4 @@
-"""Why a model may not become the champion: its own verdict, a second engine, the latest night."""
+"""Conditions for a model to become the champion: its own verdict, a second engine, the latest night."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def doubts(estimate: Estimate, confirmation: Confirmation) -> list[str]:
 
 
 def _night() -> list[str]:
-    """What the latest night of all problems on this machine says, if there was one; slow lines are right too."""
+    """Return the failures of the latest night of all problems on this machine, if any; slow lines count as right."""
     nights, _ = history.load(history.folder(), machine())
     whole = [night for night in nights if night.only is None]
     wrong = [line for line in whole[-1].lines if line.verdict in _WRONG] if whole else []
