@@ -1,4 +1,4 @@
-"""What joints demand: each kind as a few conditions, which are all that the rest of the mechanics knows of it.
+"""Joint conditions: each kind of joint as a few kinematic conditions, which state residuals and constraint forces.
 
 A joint shares what it can (`assembly.groups`), holds the rest by constraints (`assembly.placement`), closes at the
 start (`start.closure`) and pushes where its conditions forbid a motion (`analysis.joint_reactions`).
@@ -68,7 +68,7 @@ class JointCondition:
 
 @dataclass(frozen=True)
 class Meet(JointCondition):
-    """Two places coincide. held: by constraints, as somebody wants to know the force."""
+    """Two places coincide. held: by constraints, as the force is asked for."""
 
     first: Attachment
     second: Attachment
@@ -92,8 +92,8 @@ class Meet(JointCondition):
 class Along(JointCondition):
     """The second place stays on a line through the first; direction: of the line in the first body's frame [rad].
 
-    In space the direction may be an axis as it points at the start. held: by a constraint, as somebody wants to know
-    the force.
+    In space the direction may be an axis as it points at the start. held: by a constraint, as the force
+    is asked for.
     """
 
     first: Attachment
@@ -358,10 +358,10 @@ SPATIAL: dict[type, Callable[[Any], list[Any]]] = {
 
 
 def conditions(joint: Any, dimensions: int = 2) -> list[Any]:
-    """The conditions of a joint.
+    """Return the conditions of a joint.
 
     Raises InputError for a kind that is known in the plane alone, or in space alone, and NotImplementedError for one
-    that nobody told the mechanics of.
+    that is in neither table.
     """
     table, other = (CONDITIONS, SPATIAL) if dimensions == 2 else (SPATIAL, CONDITIONS)
     if type(joint) not in table:
@@ -372,8 +372,8 @@ def conditions(joint: Any, dimensions: int = 2) -> list[Any]:
 
 
 def unknown(condition: Any) -> NotImplementedError:
-    """What is raised where somebody has not been told of a condition."""
-    return NotImplementedError(f"nobody says here what a condition {type(condition).__name__} does")
+    """Return the error for a condition whose terms or forces are not stated."""
+    return NotImplementedError(f"the condition {type(condition).__name__} does not state its residual terms here")
 
 
 def of_scene(scene: Scene) -> Iterator[tuple[str, Any]]:
@@ -383,6 +383,6 @@ def of_scene(scene: Scene) -> Iterator[tuple[str, Any]]:
 
 
 def weld_of(conditions: list[Condition]) -> Turned | None:
-    """What keeps the angle, if the conditions keep the place as well."""
+    """Return the condition that keeps the angle, if another keeps the place as well."""
     held = [one for one in conditions if isinstance(one, Turned) and not one.driven]
     return held[0] if held and any(isinstance(one, Meet) for one in conditions) else None

@@ -1,4 +1,4 @@
-"""Constraints before their vectors have rows, and how they become the lists of `constraints`."""
+"""Constraint terms (bilinear forms of vectors, sums of angles), and their assembly into the arrays of `constraints`."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ class Terms:
     def __init__(self) -> None:
         self.held: list[Term | Mesh] = []
         self.pressed: dict[str, tuple[int, int]] = {}
-        """Joints whose force somebody wants to know: the first and the number of the constraints that it is of."""
+        """Joints whose force is asked for: the first of their constraints and how many they are."""
 
     def dot(
         self, name: str, u: Affine, w: Affine, lengths: int, constant: Number = 0.0, drive: Composed | None = None
@@ -124,7 +124,7 @@ class Terms:
                 self.held[k] = replace(held, u=fixed(held.u.constant), w=fixed(held.w.constant))
 
     def press(self, name: str, condition: Any, before: int) -> None:
-        """Note a joint whose force somebody wants to know. before: constraints that were there before its own."""
+        """Note a joint whose force is asked for. before: number of constraints before its own."""
         if getattr(condition, "held", False):
             self.pressed[name] = before, len(self.held) - before
 

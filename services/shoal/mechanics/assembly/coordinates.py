@@ -41,7 +41,7 @@ class Placement:
     terms: Terms = field(default_factory=Terms)
 
     def new_vector(self, position: Array, velocity: Array) -> Affine:
-        """As many more unknowns as a vector has components, with its initial value and rate, (d, lanes) each."""
+        """Add a vector of unknowns with its initial value and rate, (d, lanes) each."""
         first = len(self.positions)
         self.positions += list(position)
         self.velocities += list(velocity)

@@ -7,6 +7,7 @@ the bodies; here these follow from the poses. All arrays lead with the lanes.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
@@ -24,45 +25,32 @@ from shoal.mechanics.plane import as_complex, phasor
 from shoal.mechanics.term_values import TermValues, laned, one_lane
 from shoal.mechanics.terms import Terms
 from shoal.scene import GROUND, Attachment, Function, PointMass, Rod, Scene
+from shoal.scene.function import Composed
 
 POSE = 3
 """Numbers of a pose."""
 
 
-class _Mark(NamedTuple):
-    """A vector of a body: its components in the body's frame and their rates, (2, lanes) or (2, 1).
+PLACE, DIRECTION, ANGLE = range(3)
+"""What a vector of a body is: the way to a place [m], a unit vector, or its angle [rad] and zero."""
 
-    body: its number; -1: the ground. placed: whether it is the way to a place [m], or else a direction
+
+class _Mark(NamedTuple):
+    """A vector of a body: what it is, its components in the body's frame and their rates, (2, lanes) or (2, 1).
+
+    body: its number; -1: the ground
     """
 
     body: int
-    placed: bool
+    kind: int
     components: Array
     rates: Array
 
 
-class _Angles(NamedTuple):
-    """A sum of factors times angles of bodies at attachments, which a condition keeps; None: at zero."""
-
-    name: str
-    parts: tuple[tuple[float, Attachment], ...]
-    kept: Turned | Geared | None
-
-    def sum(self, scene: Scene, part: Any) -> Number:
-        """The same sum of something of each attachment."""
-        return sum((factor * part(scene, side) for factor, side in self.parts), np.zeros(1))
-
-    @property
-    def driven(self) -> Function | None:
-        """The function of time that the sum follows, if it does."""
-        is_driven = isinstance(self.kept, Turned) and isinstance(self.kept.angle, Function)
-        return self.kept.angle if is_driven else None  # type: ignore[union-attr]
-
-
 class RigidBodies:
-    """Separate rigid bodies of the plane, whose places and directions the conditions of the joints refer to.
+    """Separate rigid bodies of the plane, whose vectors the conditions of the joints refer to.
 
-    The unknowns of the terms are the components of the bodies' vectors; angles are counted, with all their turns.
+    The components of these vectors are the unknowns of the terms. Angles are counted, with all their turns.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -70,25 +58,24 @@ class RigidBodies:
         self.number = {name: number for number, name in enumerate(scene.bodies)}
         self.points = {name for name, body in scene.bodies.items() if isinstance(body, PointMass)}
         self.marks: list[_Mark] = []
-        self.angles: list[_Angles] = []
-        self.angle_rows: list[int] = []
-        self.lengths: dict[int, Function | None] = {}
-        """By number of the term: the length of its vector [m]; None: that of the start."""
-        self._known: dict[tuple[int, bool], tuple[Attachment, Affine]] = {}
+        self.lengths, self.wrapping = list[int](), list[int]()
+        """Numbers of the terms that are lengths of vectors, and of those where whole turns make no difference."""
+        self.of_start: dict[int, Turned | Geared | None] = {}
+        """By number of the term, the conditions that take their value from the start; None: a distance."""
+        self._known: dict[tuple[int, int], tuple[Attachment, Affine]] = {}
         for name, condition in of_scene(scene):
             condition.constrain(name, self)
         for name in self.points:  # which have no angle
-            self._hold(_Angles(name, ((1.0, Attachment(body=name, point=(0.0, 0.0))),), None))
+            self._add_angles(name, ((1.0, Attachment(body=name, point=(0.0, 0.0))),))
 
     def point(self, scene: Scene, at: Attachment) -> Affine:
         """Return the place of an attachment [m]."""
-        if at.body == GROUND and not isinstance(at.point, str):
-            return fixed(plane.vector(*at.point))
-        return self._vector(at, True)
+        is_fixed = at.body == GROUND and not isinstance(at.point, str)
+        return fixed(plane.vector(*at.point)) if is_fixed else self._vector(at, PLACE)
 
     def direction(self, scene: Scene, at: Attachment) -> Affine:
         """Return the unit vector of the body's direction at an attachment."""
-        return fixed(np.eye(2)[0][:, None]) if at.body == GROUND else self._vector(at, False)
+        return fixed(np.eye(2)[0][:, None]) if at.body == GROUND else self._vector(at, DIRECTION)
 
     def gap(self, scene: Scene, condition: Any) -> Affine:
         """Return the vector from the first place of a condition to the second [m]."""
@@ -100,42 +87,54 @@ class RigidBodies:
 
     def keep_distance(self, name: str, gap: Affine, length: Function | None) -> None:
         """Require the length of a vector [m]; None: that of the start."""
-        self.lengths[len(self.terms.held)] = length
-        self.terms.dot(name, gap, gap, 1)
+        self.lengths.append(len(self.terms.held))
+        if length is None:
+            self.of_start[len(self.terms.held)] = None
+        self.terms.dot(name, gap, gap, 1, drive=None if length is None else length.through("neg"))
 
     def keep_angle(self, name: str, condition: Turned) -> None:
-        """Require the angle from the first direction to the second, but for whole turns."""
-        if not {condition.first.body, condition.second.body} & self.points:
-            self._hold(_Angles(name, ((1.0, condition.second), (-1.0, condition.first)), condition))
+        """Require the angle from the first direction to the second, but for whole turns; a point mass has none."""
+        if {condition.first.body, condition.second.body} & self.points:
+            return
+        self.wrapping.append(len(self.terms.held))
+        drive = condition.angle.through("neg") if isinstance(condition.angle, Function) else None
+        if drive is None:
+            self.of_start[len(self.terms.held)] = condition
+        self._add_angles(name, ((1.0, condition.second), (-1.0, condition.first)), drive)
 
     def keep_mesh(self, name: str, condition: Geared) -> None:
         """Require the weighted sum of angles that the start has."""
-        self._hold(_Angles(name, tuple(zip(condition.factors, condition.sides, strict=True)), condition))
+        self.of_start[len(self.terms.held)] = condition
+        self._add_angles(name, zip(condition.factors, condition.sides, strict=True))
 
-    def _hold(self, angles: _Angles) -> None:
-        self.angle_rows.append(len(self.terms.held) + len(self.angles))
-        self.angles.append(angles)
+    def _add_angles(self, name: str, parts: Iterable[tuple[float, Attachment]], drive: Composed | None = None) -> None:
+        axis = fixed(np.eye(2)[0][:, None])
+        total = fixed(0.0 * axis.constant)
+        for factor, side in parts:
+            if side.body != GROUND:
+                total = total + self._vector(side, ANGLE) * factor
+        self.terms.dot(name, axis, total, 0, drive=drive)
 
-    def _vector(self, at: Attachment, placed: bool) -> Affine:
-        key = id(at), placed
+    def _vector(self, at: Attachment, kind: int) -> Affine:
+        key = id(at), kind
         if key not in self._known:
-            self.marks.append(self._placed(at) if placed else self._directed(at))
+            self.marks.append(self._mark(at, kind))
             axes = enumerate(np.eye(2)[..., None], 2 * len(self.marks) - 2)
             self._known[key] = at, Affine(dict(axes), np.zeros((2, 1)))
         return self._known[key][1]
 
-    def _placed(self, at: Attachment) -> _Mark:
+    def _mark(self, at: Attachment, kind: int) -> _Mark:
         if at.body == GROUND:
             assert isinstance(at.point, str)
             path = self.scene.ground_points[at.point]
-            where, rate = (plane.vector(part(path.x), part(path.y)) for part in (value_of, rate_of))
-            return _Mark(-1, True, where, rate)
-        where, rate = place_of(self.scene, at), bending_rate(self.scene, at)
-        return _Mark(self.number[at.body], True, _components(where), _components(rate))
-
-    def _directed(self, at: Attachment) -> _Mark:
-        axis = phasor(lead(self.scene, at))
-        return _Mark(self.number[at.body], False, _components(axis), _components(1j * axis * _turning(self.scene, at)))
+            return _Mark(-1, kind, *(plane.vector(part(path.x), part(path.y)) for part in (value_of, rate_of)))
+        value, rate = place_of(self.scene, at), bending_rate(self.scene, at)
+        if kind != PLACE:
+            value, rate = lead(self.scene, at), np.real(_bending(self.scene, at)[3])
+        if kind == DIRECTION:
+            value = phasor(value)
+            rate = 1j * value * rate
+        return _Mark(self.number[at.body], kind, *(plane.vector(np.real(x), np.imag(x)) for x in (value, rate)))
 
 
 @dataclass(frozen=True)
@@ -169,45 +168,6 @@ class Rows:
         return total
 
 
-class _Arrays:
-    """The terms of rigid bodies, ready to be evaluated at poses."""
-
-    def __init__(self, bodies: RigidBodies) -> None:
-        held, angles = bodies.terms.held, bodies.angles
-        self.bodies = len(bodies.number)
-        self.terms = TermValues(held, 2, list(bodies.lengths))
-        self.angle_rows = np.array(bodies.angle_rows, dtype=np.int64)
-        self.term_rows = np.setdiff1d(np.arange(len(held) + len(angles)), self.angle_rows)
-        names = dict(zip(self.term_rows.tolist(), (one.name for one in held), strict=True))
-        names |= zip(bodies.angle_rows, (one.name for one in angles), strict=True)
-        self.names = tuple(names[row] for row in range(len(names)))
-        self.angular = np.isin(np.arange(len(names)), self.angle_rows)
-        self.body = np.array([one.body for one in bodies.marks], dtype=np.int64)
-        self.moves = np.array([one.placed and one.body >= 0 for one in bodies.marks], dtype=bool)
-        self.vectors = laned([one.components.T for one in bodies.marks], (2,))
-        self.rates = laned([one.rates.T for one in bodies.marks], (2,))
-        self.distances = np.array(list(bodies.lengths), dtype=np.int64)
-        self.lengths = [None if one is None else value_of(one) for one in bodies.lengths.values()]
-        self.kept = [(one.kept or 0.0) if one.driven is None else value_of(one.driven) for one in angles]
-        self.wraps = np.array([isinstance(one.kept, Turned) for one in angles], dtype=bool)
-        self.leads = laned([one.sum(bodies.scene, lead) for one in angles], ())
-        driven = [one.sum(bodies.scene, _turning) - _slope_of(one.driven) for one in angles]
-        self.angle_drift = laned(driven, ())
-        self.term_drift = self.terms.drift.copy()
-        self.term_drift[self.distances] -= [_slope_of(one) for one in bodies.lengths.values()]
-        self.factors = np.zeros((len(angles), self.bodies))
-        for row, one in zip(self.factors, angles, strict=True):
-            for factor, side in one.parts:
-                if side.body != GROUND:
-                    row[bodies.number[side.body]] += factor
-        self.mark, self.axis = np.divmod(self.terms.unknowns, 2)
-        self.slopes_of_angles = [
-            (self.angle_rows[rows], np.full(len(rows), body), (self.factors[rows, body, None] * [0.0, 0.0, 1.0])[None])
-            for body in range(self.bodies)
-            if len(rows := np.flatnonzero(self.factors[:, body]))
-        ]
-
-
 class Closure:
     """The joints of a scene. begin: poses (lanes, 3 bodies) at which joints without a value of their own hold.
 
@@ -217,8 +177,22 @@ class Closure:
 
     def __init__(self, scene: Scene, begin: Array, own: bool = True) -> None:
         self.begin, self.own = begin, own
-        self._arrays = _Arrays(RigidBodies(scene))
-        self._at_start: tuple[Array, Array] | None = None
+        bodies = RigidBodies(scene)
+        held, marks = bodies.terms.held, bodies.marks
+        self._terms = TermValues(held, 2, bodies.lengths)
+        self._names, self._bodies = tuple(one.name for one in held), len(bodies.number)
+        self._angular = np.array([one.lengths == 0 for one in held], dtype=bool)
+        self._wrapping = bodies.wrapping
+        self._of_start, self._kept = list(bodies.of_start), list(bodies.of_start.values())
+        is_free = [not isinstance(one, Turned) or one.is_of_start for one in self._kept]
+        self._free = np.array(self._of_start, dtype=np.int64)[is_free]
+        self._body = np.array([one.body for one in marks], dtype=np.int64)
+        kinds = np.array([one.kind for one in marks], dtype=np.int64)
+        self._places, self._angles = (kinds == PLACE) & (self._body >= 0), kinds == ANGLE
+        self._vectors = laned([one.components.T for one in marks], (2,))
+        self._rates = laned([one.rates.T for one in marks], (2,))
+        self._mark, self._axis = np.divmod(self._terms.unknowns, 2)
+        self._at_start: Array | None = None
 
     def at(self, begin: Array, own: bool = True) -> Closure:
         """Return the same joints with other poses at which those hold that take their value from the start."""
@@ -228,102 +202,66 @@ class Closure:
 
     def of_lane(self, lane: int) -> Closure:
         """Return the joints of one lane, with what they keep."""
-        other, arrays = copy(self), copy(self._arrays)
-        arrays.terms = arrays.terms.of_lane(lane)
-        for name in ("vectors", "rates", "leads", "angle_drift"):
-            setattr(arrays, name, one_lane(getattr(arrays, name), lane))
-        other._arrays = arrays
-        other.begin = self.begin[lane : lane + 1]
-        other._at_start = tuple(one_lane(kept, lane) for kept in self._values_at_start)  # type: ignore[assignment]
+        other = copy(self)
+        other._terms = self._terms.of_lane(lane)
+        other._vectors, other._rates = one_lane(self._vectors, lane), one_lane(self._rates, lane)
+        other.begin, other._at_start = self.begin[lane : lane + 1], one_lane(self._values_at_start, lane)
         return other
 
     def rows(self, u: Array) -> Rows:
         """All joints at the poses u."""
-        p, each = self._arrays, u.reshape(len(u), -1, POSE)
-        arms, vectors = self._vectors(each)
-        found, slopes = p.terms.at(vectors.reshape(len(u), -1))
-        gap, rate = np.zeros((2, len(u), len(p.names)))
-        rate[:, p.term_rows], rate[:, p.angle_rows] = p.term_drift, p.angle_drift
-        lengths, angles = self._values_at_start
-        found[:, p.distances] = np.where(self._are_free(p.lengths), 0.0, found[:, p.distances] - lengths)
-        turned = self._angles(each) - angles
-        gap[:, p.term_rows] = found
-        gap[:, p.angle_rows] = np.where(
-            self._are_free(p.kept), 0.0, np.where(p.wraps, np.angle(phasor(turned)), turned)
-        )
-        crossing = _quarter(arms)[:, p.mark, p.axis]
+        vectors, crossing, rates = self._evaluate(u)
+        gap, slopes = self._terms.at(vectors)
+        gap[:, self._of_start] -= self._values_at_start
+        gap[:, self._wrapping] = np.angle(phasor(gap[:, self._wrapping]))
+        if not self.own:
+            gap[:, self._free] = 0.0
+        rate = np.repeat(self._terms.drift[None], len(u), axis=0)
         by_pose = np.zeros((*slopes.shape, POSE))
-        by_pose[:, np.arange(len(p.axis)), p.axis] = slopes * p.moves[p.mark]
-        by_pose[..., 2] = slopes * crossing
-        parts, rows = list(p.slopes_of_angles), p.term_rows[p.terms.rows]
-        if np.any(p.rates):
-            drift = slopes * self._turned(p.rates, each)[:, p.mark, p.axis]
-        for part in p.terms.groups:
-            if np.any(p.rates):
-                rate[:, rows[part]] += drift[:, part]
-            on_body = p.body[p.mark[part]] >= 0
-            parts.append((rows[part][on_body], p.body[p.mark[part]][on_body], by_pose[:, part][:, on_body]))
-        return Rows(gap, rate, p.names, p.angular, parts, p.bodies)
+        by_pose[:, np.arange(len(self._axis)), self._axis] = slopes * self._places[self._mark]
+        by_pose[..., 2] = slopes * crossing[:, self._mark, self._axis]
+        drift = None if rates is None else slopes * rates[:, self._mark, self._axis]
+        parts = []
+        for part in self._terms.groups:
+            rows, bodies = self._terms.rows[part], self._body[self._mark[part]]
+            if drift is not None:
+                rate[:, rows] += drift[:, part]
+            of_body = bodies >= 0
+            parts.append((rows[of_body], bodies[of_body], by_pose[:, part][:, of_body]))
+        return Rows(gap, rate, self._names, self._angular, parts, self._bodies)
 
-    def _vectors(self, each: Array) -> tuple[Array, Array]:
-        """The bodies' vectors from their origins and from that of the ground, (lanes, vectors, 2) both."""
-        p = self._arrays
-        arms = self._turned(p.vectors, each)
-        vectors = arms.copy()
-        vectors[:, p.moves] += each[:, p.body[p.moves], :2]
-        return arms, vectors
+    def _evaluate(self, u: Array) -> tuple[Array, Array, Array | None]:
+        """The components of all vectors at poses, (lanes, 2 vectors), and their derivatives, (lanes, vectors, 2).
 
-    def _turned(self, vectors: Array, each: Array) -> Array:
-        """Vectors that are stated in the frames of bodies, in that of the ground."""
-        turn = np.pad(each[:, :, 2], ((0, 0), (0, 1)))[:, self._arrays.body, None]  # the last is the ground
-        return np.cos(turn) * vectors + np.sin(turn) * _quarter(vectors)
-
-    def _angles(self, each: Array) -> Array:
-        """The sums of angles [rad], (lanes, sums)."""
-        return np.asarray(each[:, :, 2] @ self._arrays.factors.T + self._arrays.leads)
-
-    def _are_free(self, kept: list[Any]) -> Flags:
-        """Return which lengths or angles may take any value."""
-        of_start = [
-            one is None or isinstance(one, Geared) or (isinstance(one, Turned) and one.is_of_start) for one in kept
-        ]
-        return np.array(of_start, dtype=bool) & (not self.own)
+        These are by the angle of the body, and by time; None: all vectors rest in their bodies.
+        """
+        poses = np.pad(u.reshape(len(u), -1, POSE), ((0, 0), (0, 1), (0, 0)))[:, self._body]  # the last is the ground
+        cosine, sine = np.cos(poses[..., 2:]), np.sin(poses[..., 2:])
+        vectors = cosine * self._vectors + sine * _quarter(self._vectors)
+        crossing = _quarter(vectors)
+        vectors[:, self._angles], crossing[:, self._angles] = self._vectors[:, self._angles], [1.0, 0.0]
+        vectors[:, self._angles, 0] += poses[:, self._angles, 2]
+        vectors[:, self._places] += poses[:, self._places, :2]
+        rates = None
+        if np.any(self._rates):
+            rates = cosine * self._rates + sine * _quarter(self._rates)
+            rates[:, self._angles] = self._rates[:, self._angles]
+        return vectors.reshape(len(u), -1), crossing, rates
 
     @property
-    def _values_at_start(self) -> tuple[Array, Array]:
-        """Lengths [m] and sums of angles [rad] that are kept, (lanes, rows) each."""
+    def _values_at_start(self) -> Array:
+        """Lengths [m] and sums of angles [rad] that are kept of those at the start, (lanes, terms)."""
         if self._at_start is None:
-            p, each = self._arrays, self.begin.reshape(len(self.begin), -1, POSE)
-            lengths, angles = np.zeros((len(each), len(p.distances))), self._angles(each)
-            if None in p.lengths:
-                _, vectors = self._vectors(each)
-                lengths = p.terms.at(vectors.reshape(len(each), -1))[0][:, p.distances]
-            for k, length in enumerate(p.lengths):
-                lengths[:, k] = lengths[:, k] if length is None else length
-            for k, one in enumerate(p.kept):
-                if not isinstance(one, Geared):
-                    angles[:, k] = one.kept(angles[:, k]) if isinstance(one, Turned) else one
-            self._at_start = lengths, angles
+            found = self._terms.at(self._evaluate(self.begin)[0])[0][:, self._of_start]
+            for k, one in enumerate(self._kept):
+                found[:, k] = one.kept(found[:, k]) if isinstance(one, Turned) else found[:, k]
+            self._at_start = found
         return self._at_start
-
-
-def _slope_of(f: Function | None) -> float:
-    return 0.0 if f is None else rate_of(f)
 
 
 def _quarter(vectors: Array) -> Array:
     """Vectors (..., 2) turned by a right angle, counter-clockwise."""
     return np.stack([-vectors[..., 1], vectors[..., 0]], axis=-1)
-
-
-def _components(number: Number) -> Array:
-    """A complex number as a vector, (2, lanes) or (2, 1)."""
-    return plane.vector(np.real(number), np.imag(number))
-
-
-def _turning(scene: Scene, at: Attachment) -> Number:
-    """The rate [rad/s] at which a body's direction at an attachment turns in its frame."""
-    return np.real(_bending(scene, at)[3])
 
 
 def place_of(scene: Scene, at: Attachment) -> Number:

@@ -1,7 +1,7 @@
-"""Poses of all bodies in which every joint closes, some of them held: Newton's method with Levenberg's damping.
+"""Position analysis: poses that satisfy the loop closure equations, by the Levenberg-Marquardt method.
 
-The step is the least displacement of the bodies. Where it fails from the first guess, angles that are not stated are
-shaken, a little at first. Many lanes are one batch.
+Stated poses are held; the step is the least displacement of the bodies. Where it fails from the first guess, angles
+that are not stated are shaken, a little at first. Many lanes are one batch.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _SHAKEN = 1200
 _PATIENCE, _STANDS = 8, 0.99
 """In so many steps a search that does not stand still lowers its gaps to less than this part."""
 DEPENDENT = 1e-6
-"""Part of a pose that the joints leave free, below which they tell it."""
+"""Part of a pose that the joints leave free, below which they determine it."""
 
 
 @dataclass(frozen=True)
@@ -50,19 +50,19 @@ class Statement:
 
     @property
     def path(self) -> str:
-        """Where the scene has it."""
+        """The path of its field in the scene."""
         return f"initial.{self.body}.{self.quantity}"
 
 
 class Placed(NamedTuple):
-    """Poses (lanes, 3 bodies); whether they close the joints and keep what is stated, (lanes,)."""
+    """Poses (lanes, 3 bodies), and whether they close the joints and keep the stated values, (lanes,)."""
 
     poses: Array
     ok: Flags
 
 
 def stated(scene: Scene, lanes: int, quantities: tuple[Quantity, ...]) -> list[Statement]:
-    """What a scene states of these quantities: first what is firm, then guesses, each in the order of the scene."""
+    """Return the statements of these quantities: first the firm ones, then guesses, each in the order of the scene."""
     found = []
     number = {name: 3 * k for k, name in enumerate(scene.bodies)}
     for name, start in scene.initial.items():
@@ -108,14 +108,14 @@ class Assembly:
         return self.walk.poses(angles, self.rates)[0]
 
     def held(self, chosen: list[Statement]) -> tuple[Flags, Array]:
-        """Which poses these statements fix, and their values; each (lanes, 3 bodies)."""
+        """Return flags of the poses that these statements fix, and their values; each (lanes, 3 bodies)."""
         fixed, values = np.zeros(self.guess.shape, dtype=bool), np.zeros(self.guess.shape)
         for one in chosen:
             fixed[:, one.columns], values[:, one.columns] = True, one.values
         return fixed, values
 
     def run(self) -> Placed:
-        """Everything that is stated, or as much of it as the joints allow."""
+        """Return poses with all statements, or with as many as the joints allow."""
         fixed, values = self.held(self.statements)
         found = self.seek(fixed, values)
         if np.all(found.ok):
@@ -168,7 +168,7 @@ class Assembly:
         return Placed(best, ok)
 
     def others(self, poses: Array) -> Iterator[Array]:
-        """Other poses of one machine that keep what is stated, each once."""
+        """Yield other poses of one machine that keep all firm statements, each once (other assembly modes)."""
         fixed, values = self.held([one for one in self.statements if one.firm])
         known, first = [poses], np.where(fixed, values, self.guess)
         shaken = [self._guess(attempt, fixed[:, 2::3]) for attempt in range(1, ATTEMPTS)]
@@ -239,7 +239,7 @@ class Assembly:
         return u, np.max(np.abs(gap), axis=1)
 
     def _in_order(self) -> Placed:
-        """Statements are kept one after the other; firm ones must all be met, up to the rounding of their digits."""
+        """Keep statements one after the other; firm ones must all be met, up to the rounding of their digits."""
         firm = [one for one in self.statements if one.firm]
         fixed, values = self.held(firm)
         found = self.seek(fixed, values)

@@ -1,7 +1,7 @@
-"""Rates of all bodies that keep the joints closed and what is stated of them, one row after the other.
+"""Velocity analysis: rates that satisfy the joints and the stated rates, by Gram-Schmidt orthogonalisation.
 
 Rows are orthonormalised in the metric of the kinetic energy: joints first, then statements in their order. A row that
-depends on those before it is already told by them. What no row tells stays as near as it can to a first guess. In a
+depends on those before it is determined by them. Directions that no row determines stay nearest to a first guess. In a
 singular position the second derivative of the joints must vanish along the motion as well, which picks its branch.
 """
 
@@ -183,7 +183,7 @@ class _Basis:
         return self.rows.shape[1]
 
     def add(self, row: Array, target: Array) -> tuple[Array, Flags]:
-        """What a row misses its target by, and whether those before it told it, (lanes,) each."""
+        """Add a row; return its residual before, and whether it depends on earlier rows, (lanes,) each."""
         a = np.einsum("lij,lj->li", self.inverse, row)
         length = np.linalg.norm(a, axis=1) + 1e-300
         a = a / length[:, None]
@@ -204,7 +204,7 @@ class _Basis:
         return np.asarray(np.einsum("lji,lj->li", self.inverse, self.y))
 
     def rest(self, lane: int) -> Array:
-        """Directions of v that no row tells, (directions, 3 bodies), orthonormal in the metric."""
+        """Return the null space of the rows, (directions, 3 bodies), orthonormal in the metric."""
         split = np.linalg.svd(self.rows[lane])
         rank = int(np.sum(split.S > 0.5))
         return np.asarray(split.Vh[rank:] @ self.inverse[lane])

@@ -1,4 +1,4 @@
-"""Joints that hold what others hold already: their forces are not unique, and the least ones are taken."""
+"""Redundant joints of planar machines, by the null space of the transposed Jacobian (their forces are not unique)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _LARGEST = 400
 
 
 def redundant_joints(scene: Scene) -> tuple[str, ...]:
-    """Joints of a started scene that depend on others, and do so beside the start too, if the machine can move."""
+    """Return joints of a started scene that depend on others, there and, if the machine can move, also near it."""
     if sum(3 for _ in scene.joints) > _LARGEST or not scene.joints:
         return ()
     scene = _split(scene)
@@ -39,7 +39,7 @@ def redundant_joints(scene: Scene) -> tuple[str, ...]:
 
 
 def _dependent(assembly: Assembly, poses: Array) -> tuple[tuple[str, ...], Array]:
-    """Joints whose rows depend on others, and the motions that the rows leave free, (motions, 3 bodies)."""
+    """Return the joints of dependent rows, and the null space of all rows, (motions, 3 bodies)."""
     rows = assembly.closure.at(poses).rows(poses)
     unit_size = np.where(np.arange(poses.shape[1]) % 3 == 2, 1.0 / assembly.size, 1.0)
     slope = rows.slope[0] * unit_size
@@ -52,7 +52,7 @@ def _dependent(assembly: Assembly, poses: Array) -> tuple[tuple[str, ...], Array
 
 
 def _split(scene: Scene) -> Scene:
-    """The scene with flexible rods as separate bodies, one at each place of a joint: what they hold is not rigid."""
+    """Return the scene with a separate body for each place of a flexible rod, as the rod does not hold them rigidly."""
     bodies = {name: body for name, body in scene.bodies.items() if body.element == "rigid"}
     initial = {}
     for name in bodies:

@@ -1,6 +1,6 @@
-"""The start of a machine: poses and rates of all bodies that agree with the joints and with what the user states.
+"""Consistent initial conditions of a planar machine: poses and rates that satisfy its joints and the stated values.
 
-What is stated is kept exactly if it can be; what is not stated follows from it, or is zero where nothing tells it.
+Stated values are kept exactly if possible; all others follow from them, or are zero where nothing determines them.
 Stated values that miss by the rounding of their digits are corrected in the order of the scene, and so are guesses
 (`InitialState.guess`). Any other contradiction is refused by name.
 """
@@ -44,12 +44,12 @@ class Start(NamedTuple):
 
 
 def started(scene: Scene) -> Start:
-    """The start of a scene. Raises InputError if a single scene has none; of many lanes, says which have none."""
+    """Return the start of a scene. Raises InputError if a single scene has none; of many lanes, reports those."""
     return Start(scene, np.zeros(1, dtype=bool)) if is_direct(scene) else complete(scene)
 
 
 def complete(scene: Scene) -> Start:
-    """The same with every quantity of every body filled in."""
+    """Return the start with every quantity of every body."""
     count = lanes_of((scene.initial, scene.bodies, scene.joints))
     lanes = max(count, 1)
     assembly = Assembly(scene, lanes)
@@ -122,7 +122,7 @@ def is_direct(scene: Scene) -> bool:
 
 
 def _pose_refused(assembly: Assembly) -> InputError:
-    """Which of the stated poses contradict each other, or which joint cannot be closed at all."""
+    """Return an error that names the stated poses in contradiction, or the joint that cannot be closed at all."""
     none = np.zeros_like(assembly.guess, dtype=bool)
     if not assembly.seek(none, np.zeros_like(assembly.guess)).ok[0]:
         name, gap, _ = _gape(assembly, [])
@@ -137,9 +137,9 @@ def _pose_refused(assembly: Assembly) -> InputError:
 
 
 def _narrowed(assembly: Assembly, guilty: list[Statement]) -> tuple[list[Statement], bool]:
-    """Those that still contradict each other without the rest, large parts left out first; whether none can be missed.
+    """Return a minimal conflict: statements that contradict each other without the rest, and whether it is minimal.
 
-    The last ones are kept, as in the order of the scene they are the ones that come too many.
+    Large parts are left out first; the last statements of the scene are kept, as the ones in excess.
     """
     begun, joints = assembly.effort, list(assembly.scene.joints)
     for mechanism in dict.fromkeys(tuple(_connected(assembly.scene, [one.body])) for one in guilty):
@@ -166,7 +166,7 @@ def _narrowed(assembly: Assembly, guilty: list[Statement]) -> tuple[list[Stateme
 
 
 def _held_open(assembly: Assembly, chosen: list[Statement]) -> tuple[Array, Rows]:
-    """Weights, and gaps with these statements held where what closes loops gapes as little as it can."""
+    """Return weights of the rows, and the rows of least gaps in joints that close loops, with statements kept."""
     fixed, values = assembly.held(chosen)
     weight = np.where(np.isin(assembly.closure.rows(assembly.guess).names, assembly.walk.closing), 1.0, 1e3)
     u, _ = assembly.close(assembly.closure, np.where(fixed, values, assembly.guess), fixed, weight)
@@ -174,7 +174,7 @@ def _held_open(assembly: Assembly, chosen: list[Statement]) -> tuple[Array, Rows
 
 
 def _pulled(assembly: Assembly, chosen: list[Statement]) -> list[Statement]:
-    """Those that gaps would pull away if joints were springs: the others do not keep the machine open."""
+    """Return the statements that gaps would pull if joints were springs: the others do not keep the machine open."""
     weight, rows = _held_open(assembly, chosen)
     length = np.where(rows.angular, 1.0, assembly.size) / weight
     pull = np.abs(rows.gap[0] / length**2 @ rows.slope[0]) * np.sqrt(assembly.give)
@@ -183,10 +183,7 @@ def _pulled(assembly: Assembly, chosen: list[Statement]) -> list[Statement]:
 
 
 def _gape(assembly: Assembly, chosen: list[Statement]) -> tuple[str, str, bool]:
-    """The joint that closes a loop, or the first of those that gape, and by how much, with these statements held.
-
-    And whether that is as little as rounded numbers may leave.
-    """
+    """Return the joint of the worst residual with these statements kept, its size, and whether rounding explains it."""
     rows = _held_open(assembly, chosen)[1]
     near = _connected(assembly.scene, [one.body for one in chosen])
     size = np.abs(rows.gap[0]) * np.isin(rows.names, near)
@@ -199,7 +196,7 @@ def _gape(assembly: Assembly, chosen: list[Statement]) -> tuple[str, str, bool]:
 
 
 def _connected(scene: Scene, bodies: list[str]) -> list[str]:
-    """Joints of the mechanisms that these bodies are parts of, all joints if there are no bodies."""
+    """Return the joints of the mechanisms that these bodies are parts of, all joints if there are no bodies."""
     joints = {name: {at.body for at in places(joint)} - {GROUND} for name, joint in scene.joints.items()}
     found, size = set(bodies), -1
     while len(found) > size:
@@ -209,7 +206,7 @@ def _connected(scene: Scene, bodies: list[str]) -> list[str]:
 
 
 def _rates_refused(velocities: Velocities, broken: list[Statement]) -> InputError:
-    """Which of the stated rates contradict each other, or which joint cannot move as it is driven."""
+    """Return an error that names the stated rates in contradiction, or the joint that cannot move as it is driven."""
     if not broken:
         for name in dict.fromkeys(velocities.rows.names):
             if velocities.run(joint=name).ok[0]:
@@ -230,7 +227,7 @@ def _rates_refused(velocities: Velocities, broken: list[Statement]) -> InputErro
 
 
 def _contradiction(guilty: list[Statement], why: str, fewest: bool = True) -> InputError:
-    """One line that names the last of the statements and those that it contradicts. fewest: whether all of them do."""
+    """Return an error that names the last statement and those that it contradicts. fewest: whether all of them do."""
     *others, last = guilty
     if not others:
         return InputError(f"{_stated(last)}: {why}; leave it out and it follows from the joints")
@@ -307,7 +304,7 @@ def _summed(vector: Affine, constant: Array, q: Array) -> Array:
 
 
 def changes(scene: Scene, used: Mapping[str, InitialState], size: Number, lanes: int = 1) -> list[dict[str, Any]]:
-    """What was stated and is not what is used, of every lane: body -> quantity -> stated, used.
+    """Return the stated values that are not used, of every lane: body -> quantity -> stated, used.
 
     Round-off of any size [m] is left out. An angle or rate in space is told as the rotation or spin where what is used
     is not about z.
@@ -335,7 +332,7 @@ def changes(scene: Scene, used: Mapping[str, InitialState], size: Number, lanes:
 
 
 def _alike(quantity: Quantity, stated: Any, used: InitialState, lanes: int) -> tuple[Quantity, Array, Array | None]:
-    """A quantity, what is stated of it, and what is used, (components, lanes) that may be compared; None: has none."""
+    """Return a quantity, its stated and its used values, (components, lanes), to be compared; None: has none."""
     if used.rotation is not None and quantity in ABOUT_Z:
         quantity, stated = ABOUT_Z[quantity], (0.0, 0.0, stated)
     wanted, now = _rows(stated, lanes), getattr(used, quantity)

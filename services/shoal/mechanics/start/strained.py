@@ -18,7 +18,7 @@ def gives_way(scene: Scene) -> bool:
 
 
 def numbers_of_start(scene: Scene) -> Iterator[tuple[str, str]]:
-    """Fields of joints and loads that take a number from the start, or its side, and what to state instead.
+    """Yield fields of joints and loads that take a number from the start, or its side, and the field to state instead.
 
     In space the stated rotations alone tell axes and what welds keep, so that these need no start that closes.
     """

@@ -1,4 +1,4 @@
-"""A first guess of where bodies are: a walk along the joints from the ground, and from bodies that say it."""
+"""Forward kinematics along a spanning tree of the joints, from the ground and from bodies with a stated position."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _USUAL = (*_TWO_SIDED, Geared)
 
 
 class Walk:
-    """The order in which the joints of a scene place its bodies. Raises InputError where nothing tells a place."""
+    """The spanning tree in whose order joints place the bodies. Raises InputError where nothing determines a place."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
@@ -53,7 +53,7 @@ class Walk:
                             return there.body, here, there, 0.0
                         if condition.length is not None:
                             return there.body, here, there, value_of(condition.length)
-        # Any other condition than these may tell it.
+        # Any other condition than these may determine it.
         if any(not isinstance(condition, _USUAL) for _, condition in of_scene(self.scene)):
             return next(iter(waiting)), None, None, 0.0
         name = next(iter(waiting))
@@ -79,7 +79,7 @@ class Walk:
 
     @property
     def closing(self) -> list[str]:
-        """Joints that the walk does not need: they close loops."""
+        """Joints that are not in the tree: they close loops."""
         used = {(id(here), id(there)) for _, here, there, _ in self.steps}
         needed = {
             name
@@ -109,7 +109,7 @@ class Walk:
 
 
 def guessed_angles(scene: Scene, lanes: int) -> tuple[Array, Array]:
-    """Angles [rad] and rates [rad/s] of all bodies: as stated, as a neighbour tells, or zero; each (lanes, bodies)."""
+    """Return angles [rad] and rates [rad/s] of all bodies: as stated, by a neighbour, or zero; each (lanes, bodies)."""
     both, ties = [], [condition for _, condition in of_scene(scene) if isinstance(condition, Turned)]
     for quantity, level in (("angle", 0), ("rate", 1)):
         found: dict[str, Number] = {
@@ -131,7 +131,7 @@ def _both_ways(condition: Meet | Along | Apart | Turned) -> tuple[tuple[Attachme
 
 
 def _tied(scene: Scene, ties: list[Turned], found: dict[str, Number], level: int) -> Iterator[tuple[str, Number]]:
-    """Bodies whose angle (level 0) or rate (level 1) a joint tells from that of a neighbour."""
+    """Yield bodies whose angle (level 0) or rate (level 1) follows by a joint from that of a neighbour."""
     for tie in ties:
         if (tie.first.body in found) == (tie.second.body in found):
             continue

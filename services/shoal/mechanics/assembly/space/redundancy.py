@@ -1,4 +1,4 @@
-"""Joints in space that hold what others hold already."""
+"""Redundant joints in space, by the null space of the transposed Jacobian of the constraints."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ SOUGHT, ROUNDS = 24, 4
 
 
 def redundant(scene: Scene, q: Array) -> tuple[str, ...]:
-    """Joints that hold what others hold already at these coordinates, (unknowns,): they share a dependent row."""
+    """Return the joints that are redundant at these coordinates, (unknowns,): they have a part in a dependent row."""
     terms = place_in_space(scene).terms.held
     if not terms:
         return ()

@@ -1,7 +1,7 @@
-"""The start in space: the stated poses and rates, moved as little as the joints demand.
+"""Consistent initial conditions in space: the Gauss-Newton method for poses, least kinetic energy for rates.
 
-What is stated is kept exactly if it can be; what is not stated follows from it. Unlike in the plane the search is made
-in the coordinates themselves: poses by Gauss and Newton's method, rates of least kinetic energy of the change.
+Stated values are kept exactly if possible; all others follow from them, with the least change. Unlike in the plane the
+search is made in the coordinates of the machine.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ ATTEMPTS = 16
 DEPENDENT = 1e-9
 """Singular values below this, relative to the largest, are of rows that depend on others."""
 FREE = 1e-6
-"""Part of a guess that the joints and what is kept leave free, below which they tell it."""
+"""Part of a guess that the joints and kept statements leave free, below which they determine it."""
 GUESSED = 10
 """Iterations in which a guess is met, if it can be."""
 
@@ -66,7 +66,7 @@ class _Stated(NamedTuple):
     firm: bool
 
     def off(self, q: Array) -> float:
-        """How far it is from its value at the coordinates, or rates, q."""
+        """Return the residual at the coordinates, or rates, q."""
         return float(sum(factor * q[unknown] for unknown, factor in self.parts)) - self.value
 
 
@@ -268,7 +268,7 @@ class _Closing:
         return False
 
     def _rows(self, quantities: tuple[Quantity, ...], lane: int) -> list[_Stated]:
-        """What is stated of these quantities."""
+        """Return the statements of these quantities."""
         found = []
         for body, start in self.scene.initial.items():
             frame = self.placement.frames[body]
@@ -309,14 +309,14 @@ class _Closing:
         )
 
     def _moves(self, lane: int, wanted: _Rates) -> bool:
-        """Return whether the rates meet the constraints and what is stated, guesses among it."""
+        """Return whether the rates satisfy the constraints and all statements, guesses included."""
         (slope, driven, _, pace), v = wanted, self.v[:, lane]
         kept = all(abs(one.off(v)) <= CLOSED * pace for one in self._rows(_RATES, lane))
         kept = kept and all(np.all(np.abs(rows @ v) <= CLOSED * pace) for rows in self._straining(lane))
         return bool(kept and np.all(np.abs(slope @ v + driven) <= CLOSED * pace))
 
     def _straining(self, lane: int) -> Iterator[Array]:
-        """Of every flexible rod, the part of its vectors' rates that is no rigid motion, as rows of the rates.
+        """Yield for every flexible rod rows of the rates that vanish in rigid motions of its vectors.
 
         A rod starts as a rigid body moves, unless the joints forbid it.
         """
@@ -335,7 +335,7 @@ class _Closing:
                 yield flat - rigid @ (rigid.T @ flat)
 
     def _move(self, lane: int) -> bool:
-        """Rates that meet the constraints and what is stated; false if there are none."""
+        """Find rates that satisfy the constraints and the statements; return false if there are none."""
         asked = self._rates(lane)
         if self._moves(lane, asked):
             return True
