@@ -6,6 +6,7 @@ import asyncio
 import json
 import logging
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import httpx
@@ -82,6 +83,22 @@ def test_every_request_has_its_line(
 ) -> None:
     line = logged(program, caplog, method, path, **request_)
     assert (line["operation"], line["status"], line["key"]) == (operation, status, None)
+
+
+def test_probes_are_logged_when_their_status_changes(program: FastAPI, caplog: pytest.LogCaptureFixture) -> None:
+    """`make up` asks five times a second."""
+    states = [False] * 5 + [True] * 3 + [False] * 2
+    caplog.set_level(logging.INFO, "shoal.api.access")
+
+    async def ask() -> None:
+        async with httpx.AsyncClient(transport=httpx.ASGITransport(program), base_url="http://127.0.0.1") as client:
+            for state in states:
+                program.state.calls = program.state.job_pool = SimpleNamespace(ready=state)
+                assert (await client.get("/ready")).status_code == (200 if state else 503)
+
+    asyncio.run(ask())
+    lines = [json.loads(one.message) for one in caplog.records if one.name == "shoal.api.access"]
+    assert [(line["operation"], line["status"]) for line in lines] == [("GET /ready", code) for code in (503, 200, 503)]
 
 
 def test_nobody_without_a_key_has_a_body_read(program: FastAPI) -> None:

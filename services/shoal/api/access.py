@@ -17,10 +17,14 @@ from shoal.api.guard import Application, Message, Receive, Scope, Send
 log = logging.getLogger("shoal.api.access")
 KEY_NAME = "key_name"
 """Where the state of a request holds the name of its API key."""
+PROBES = "GET /health", "GET /ready"
+"""Asked for several times a second by whoever waits for a service, and every few seconds by whoever watches it."""
+CLIENTS = 64
+"""Whose probes are remembered at most."""
 
 
 class AccessLog:
-    """ASGI middleware that logs each request when it has been answered.
+    """ASGI middleware that logs each request when it has been answered, a repeated probe if its status has changed.
 
     A line holds: time (UTC, when the request began), client (its address), key (the name of its API key), operation
     (method and endpoint, as in /openapi.json), entry (KIND/NAME of the library, or the identifier of a job), status
@@ -29,6 +33,7 @@ class AccessLog:
 
     def __init__(self, application: Application) -> None:
         self.application = application
+        self._probed: dict[tuple[str, object], int | None] = {}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass a request on and log it."""
@@ -50,15 +55,28 @@ class AccessLog:
             raise
         finally:
             route, about = scope.get("route"), scope.get("path_params", {})
-            write(
-                begun,
-                scope.get("client"),
-                status,
-                time.perf_counter() - start,
-                key=scope.get("state", {}).get(KEY_NAME),
-                operation=f"{scope['method']} {_endpoint(scope['path'], route.path)}" if route is not None else None,
-                entry="/".join(map(str, about.values())) or None,
-            )
+            operation = f"{scope['method']} {_endpoint(scope['path'], route.path)}" if route is not None else None
+            client = scope.get("client")
+            if not self._is_repeated(operation, client, status):
+                write(
+                    begun,
+                    client,
+                    status,
+                    time.perf_counter() - start,
+                    key=scope.get("state", {}).get(KEY_NAME),
+                    operation=operation,
+                    entry="/".join(map(str, about.values())) or None,
+                )
+
+    def _is_repeated(self, operation: str | None, client: Sequence[object] | None, status: int | None) -> bool:
+        """Return whether this is a probe by a client that has had the same status before."""
+        if operation not in PROBES:
+            return False
+        asked = operation, client[0] if client else None
+        repeated = asked in self._probed and self._probed[asked] == status
+        if len(self._probed) < CLIENTS or asked in self._probed:
+            self._probed[asked] = status
+        return repeated
 
 
 def _endpoint(path: str, template: str) -> str:
