@@ -81,6 +81,14 @@ def test_a_sweep_of_which_all_points_start_as_stated_says_nothing() -> None:
     }
 
 
+def test_a_scene_that_states_nothing_of_its_start_starts_nowhere_else() -> None:
+    scene = Scene.parse({key: value for key, value in slider_crank().model_dump(exclude_unset=True).items()
+                         if key != "initial"})  # fmt: skip
+    found = sweep(scene, {"joints.R.length": RODS}, get_engine("gauss"), 0.0)
+    assert found.message == found.complaint
+    assert found.to_json()["starts"]["values"] == {}
+
+
 def test_points_that_cannot_be_put_together_have_a_reason_and_no_places() -> None:
     """The swept angle itself is not kept where the rod does not reach the slider's line."""
     scene = slider_crank().with_values({"joints.R.length": 0.1})

@@ -100,8 +100,8 @@ class Sweep:
     def elsewhere(self) -> Elsewhere:
         """Summarise the accepted points that start elsewhere than stated."""
         good = (one for one, status in zip(self.changes, self.status, strict=False) if status is Status.OK)
-        away = np.array([self.stated.away(one) for one in good])
-        return self.stated.elsewhere(away.reshape(-1, len(self.stated.values)))
+        away = [self.stated.away(one) for one in good]
+        return self.stated.elsewhere(np.reshape(away, (len(away), len(self.stated.values))))
 
     @cached_property
     def begun(self) -> dict[str, tuple[Array, str]]:
