@@ -38,9 +38,8 @@ class Sum:
                 both = fft.irfft(fft.rfft(below, 2 * CELLS) * fft.rfft(own, 2 * CELLS), 2 * CELLS)
                 below = np.maximum(both[:CELLS], 0.0)
         assert below is not None
-        # The sum of k middles of cells is below its bound up to this cell.
-        last = CELLS - (len(self.means) - 1) // 2 - (len(self.means) - 1) % 2
-        return float(1 - below[: last + (len(self.means) - 1) % 2].sum())
+        # Middles of k cells whose numbers add up to i are at i + k / 2, the bound half a cell beyond the last one.
+        return float(1 - below[: CELLS - len(self.means) + 1].sum())
 
     def asked(self, seed: int) -> Passing:
         """By `auto`, with values as the parameters and with their logarithms."""
@@ -85,6 +84,18 @@ def test_the_convolution_by_plain_sampling() -> None:
         values = np.exp(of.means + of.deviations * np.random.default_rng(count).standard_normal((2_000_000, count)))
         seen = float(np.mean(values.sum(axis=1) > of.bound))
         assert of.exceedance() == pytest.approx(seen, rel=4 / np.sqrt(seen * 2_000_000))
+
+
+def test_the_convolution_of_many_variables_by_importance_sampling() -> None:
+    """Sixteen that are alike, with normal variables moved to the design point, which is known."""
+    count, deviation, bound = 16, 0.2, 20.0
+    of = Sum(np.zeros(count), np.full(count, deviation), bound)
+    moved = np.log(bound / count) / deviation
+    z = np.random.default_rng(0).standard_normal((400_000, count)) + moved
+    weights = np.exp(count * moved**2 / 2 - moved * z.sum(axis=1)) * (np.exp(deviation * z).sum(axis=1) > bound)
+    error = float(weights.std() / np.sqrt(len(weights)))
+    assert error < 0.01 * weights.mean()
+    assert of.exceedance() == pytest.approx(float(weights.mean()), abs=4 * error)
 
 
 @pytest.mark.parametrize("seed", [0, 1, 17])

@@ -184,7 +184,7 @@ def _search(margins: Margins, pilot: Levels, known: list[DesignPoint], seed: int
         foretold = design_points(free, np.vstack([np.zeros((1, parameters)), axes, -axes, _apart(many.places)]))
         if len(many.places):
             samples.insert(0 if fair else 1, Sample(many.places, many.margins, np.ones(len(many.places))))
-    margins.most = margins.evaluations + int((FOR_POINTS if fair or known else MORE_POINTS) * margins.left)
+    margins.most = margins.evaluations + int((FOR_POINTS if fair else MORE_POINTS) * margins.left)
     points, starts, ended = known, _fresh(foretold[:STARTS], known, parameters), False
     if not fair:
         starts = np.zeros((0, parameters))
