@@ -134,4 +134,5 @@ def test_a_machine_for_a_thousand_seconds() -> None:
     angles = [found.column("A", "angle", of) + math.pi / 2 for of in (found.bounds.lower, found.bounds.upper)]
     assert np.abs(angles[0] - lower).max() < 1e-7
     assert np.abs(angles[1] - upper).max() < 1e-7
-    assert found.evaluations - found.controls <= 9
+    # Each bound is attained by a run of its own.
+    assert found.evaluations - found.controls <= 9 + 2 * len(times)
