@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from shoal.engines.gauss import GaussEngine
+from shoal.engines.verification import verified
 from shoal.mechanics.assembly.build import build
 from shoal.mechanics.simulate import simulate
 from shoal.scene import Scene
@@ -36,7 +38,7 @@ def swung(drive: Any, crank: float, arm: float, start: dict[str, float], times: 
         up = crank * (np.cos(angle) * bend - np.sin(angle) * rate**2) + 9.81
         return [y[1], 1.5 / arm * (np.sin(y[0]) * x - np.cos(y[0]) * up)]
 
-    found = solve_ivp(rates, (0, times[-1]), [start["angle"], start["rate"]], "DOP853", times, rtol=1e-11, atol=1e-12,
+    found = solve_ivp(rates, (0, times[-1]), [start["angle"], start["rate"]], "DOP853", times, rtol=1e-13, atol=1e-14,
                       max_step=longest).y[0]  # fmt: skip
     angle = np.array([drive(t)[0] for t in times])
     return np.stack([crank * f(angle) + arm * f(found) for f in (np.cos, np.sin)], axis=1)
@@ -93,6 +95,29 @@ def test_drives_leave_multipliers_unique(integrator: str) -> None:
         run = simulate(scene, times)
         assert run.ok, run.message
         np.testing.assert_allclose(run.marker("e"), swung(drive, crank, arm, start, times, 0.01), atol=1e-3)
+
+
+@pytest.mark.parametrize("tolerance", [1e-10, 1e-12])
+def test_the_estimated_error_of_an_open_chain_is_that_of_its_tolerance(tolerance: float) -> None:
+    """A drive closes no loop: the looser run is a hundred times worse, and nothing near a singular position."""
+    rng = np.random.default_rng(11)
+    times = np.linspace(0.0, 2.0, 9)[1:]
+    for _ in range(6):
+        crank, arm = rng.uniform(0.05, 0.3, 2)
+        way, pace, start = rng.uniform(0.5, 2), rng.uniform(1, 3), {"angle": rng.uniform(-3, 3), "rate": 0.0}
+
+        def drive(t: float, way: float = way, pace: float = pace) -> tuple[float, float, float]:
+            s, c = np.sin(pace * t), np.cos(pace * t)
+            return way * s, way * pace * c, -way * pace**2 * s
+
+        tolerances = {"relative_tolerance": tolerance, "absolute_tolerance": 0.1 * tolerance}
+        scene = hanging(f"{way}*sin({pace}*t)", crank, arm, start, duration=2.0, **tolerances)
+        run = verified(GaussEngine(), scene, times)
+        assert run.ok, run.message
+        wanted = swung(drive, crank, arm, start, times, 0.01)
+        error = float(np.max(np.linalg.norm(run.marker("e") - wanted, axis=1)))
+        assert 0.5 * error <= run.model["verification"]["time_error"] <= 100.0 * error
+        assert run.model["distance_from_singular"] > 0.1
 
 
 @pytest.mark.parametrize("dimensions", [2, 3])

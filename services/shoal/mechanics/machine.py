@@ -26,7 +26,7 @@ from shoal.mechanics.halts import Halts
 from shoal.mechanics.integrators import Choice, halting
 from shoal.mechanics.integrators import facts as facts_of
 from shoal.mechanics.kernels import Seek
-from shoal.mechanics.marched import CONSTRAINT_DRIFT, ENERGY_DRIFT, EVALUATIONS, NEAR, NUMBERS, STEPS, TURN, told
+from shoal.mechanics.marched import CLOSENESS, CONSTRAINT_DRIFT, ENERGY_DRIFT, EVALUATIONS, NUMBERS, STEPS, TURN, told
 from shoal.mechanics.model import Arrays, Model
 from shoal.mechanics.numerics.tile import SINGLE, WIDE, Array, Tile, stacked, tiles
 from shoal.mechanics.start import start
@@ -134,8 +134,8 @@ class Machine:
         largest = np.maximum.reduce(numbers, axis=1)
         facts = pickle.loads(self._told[single])
         facts["evaluations"] = int(largest[EVALUATIONS])
-        if largest[NEAR] > 0.0:
-            facts["passes_singular"] = True
+        if largest[CLOSENESS] > 0.0:
+            facts["distance_from_singular"] = float(largest[CLOSENESS] ** -0.5)
         ended = Ended(moved, end, *left[0], motion[-1, :, d, 0].copy()) if left and status[0] is Status.OK else None
         return Trajectory(
             engine="gauss",

@@ -131,7 +131,7 @@ def loop(place):  # type: ignore[no-untyped-def]
     for lane in range(len(tile)):
         record.steps[lane] = number + cuts
         record.evaluations[lane] = scheme.evaluations[0]
-        record.reached[lane], record.near[lane] = now, w.gauss.near[lane]
+        record.reached[lane], record.closeness[lane] = now, w.gauss.closeness[lane]
     for i in range(2 * len(tile)):
         record.ended[i] = w.gauss.ended[i]
 

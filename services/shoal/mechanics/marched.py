@@ -23,7 +23,7 @@ class Marched(NamedTuple):
     energy_error: largest |E + dissipated - E(0)| [J]; energy_scale: largest energy in motion [J], kinetic, of
     bent bodies and the size of that of springs; drift: largest violation of a constraint by its power of a length,
     (POWERS * lanes,); begin: coordinates and rates at the start, made consistent, (2 * unknowns, lanes);
-    ended, near: as in `GaussWork`, (2 * lanes,) and (lanes,).
+    ended, closeness: as in `GaussWork`, (2 * lanes,) and (lanes,).
     Common to the lanes of a tile: steps taken, evaluations of the forces, the time reached [s].
     """
 
@@ -33,7 +33,7 @@ class Marched(NamedTuple):
     drift: Array
     begin: Array
     ended: Array
-    near: Array
+    closeness: Array
     steps: Array
     evaluations: Array
     reached: Array
@@ -166,7 +166,7 @@ def frame_type(frame: Frame) -> Any:
 
 
 FARTHEST, ENERGY_DRIFT, CONSTRAINT_DRIFT, ENERGY_SCALE = range(4)
-STEPS, EVALUATIONS, REACHED, ENDED, UNCLOSED, NEAR = range(4, 10)
+STEPS, EVALUATIONS, REACHED, ENDED, UNCLOSED, CLOSENESS = range(4, 10)
 """Rows of the numbers that a run is judged by: the largest distance of a marker from its nearest anchor [m]; the energy
 error over the largest energy in motion; the largest violation of a constraint, relative to the machine's size;
 and as `Marched` has them."""
@@ -224,7 +224,7 @@ def told(
         numbers[ENERGY_SCALE, lane], numbers[STEPS, lane] = record.energy_scale[own], record.steps[own]
         numbers[EVALUATIONS, lane], numbers[REACHED, lane] = record.evaluations[own], record.reached[own]
         numbers[ENDED, lane], numbers[UNCLOSED, lane] = record.ended[own], record.ended[width + own]
-        numbers[NEAR, lane] = record.near[own]
+        numbers[CLOSENESS, lane] = record.closeness[own]
 
 
 @njit(cache=True, error_model="numpy")

@@ -127,38 +127,48 @@ def analyse(
 
 
 @njit(cache=True, error_model="numpy")
-def factor(tile: Tile, s: Saddle, entries: int, jacobian: Array, w: SaddleWork, tolerance: float) -> int:
+def factor(
+    tile: Tile, s: Saddle, entries: int, jacobian: Array, w: SaddleWork, tolerance: float, closeness: Array
+) -> int:
     """Factor the problem for a Jacobian (entries, lanes); returns how many rows were left out in some lane.
 
     The factors are solved with by `sparse.solve`, the right-hand side ordered by place. They serve for the removal of
-    drift as well, unless some row is left out, now or by its tolerance: w.weak[0] is how many are.
+    drift as well, unless some row is left out, now or by its tolerance: w.weak[0] is how many are. For closeness see
+    `eliminate`.
     """
     simd.assign(w.values, s.base, s.slots * len(tile))
     for e in range(entries):
         copy(tile, w.values, s.slot[e], jacobian, e)
-    dropped, weak = eliminate(tile, s.pattern, s.multiplier, w.values, tolerance)
+    dropped, weak = eliminate(tile, s.pattern, s.multiplier, w.values, tolerance, closeness)
     w.weak[0] = max(dropped, weak)
     return dropped  # type: ignore[no-any-return]
 
 
 @njit(cache=True, error_model="numpy")
-def eliminate(tile: Tile, p: sparse.Pattern, multiplier: Index, values: Array, tolerance: float) -> tuple[int, int]:
+def eliminate(
+    tile: Tile, p: sparse.Pattern, multiplier: Index, values: Array, tolerance: float, closeness: Array
+) -> tuple[int, int]:
     """Replace a matrix with multipliers (slots, lanes) by its factors. Pointers.
 
     The pivot of a multiplier is compared with what it is when only its coordinates are taken out. Returns how many rows
-    were left out, and how many would be by the tolerance SETTLED.
+    were left out, and how many would be by the tolerance SETTLED. closeness: inverse square of the distance from
+    singular, (lanes,), which rows that are not left out raise to their own.
     """
     width, dropped, weak = len(tile), 0, 0
+    closest = simd.load(tile, closeness, 0)
     for k in range(p.size):
         first = _by_coordinates(tile, p, multiplier, values, k)
         pivot = sparse.finish_row(tile, p, values, k)
         if multiplier[k]:
-            simd.store(values, k * width, simd.inverse_below(pivot, -tolerance * first))
+            inverse = simd.inverse_below(pivot, -tolerance * first)
+            closest = simd.larger(closest, first * inverse)
+            simd.store(values, k * width, inverse)
             dropped += simd.zeros(simd.load(tile, values, k * width))
             weak += simd.zeros(simd.inverse_below(pivot, -SETTLED * first))
         else:
             simd.store(values, k * width, 1.0 / pivot)
         sparse.start_column(tile, p, values, k)
+    simd.store(closeness, 0, closest)
     return dropped, weak
 
 

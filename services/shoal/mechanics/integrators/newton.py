@@ -145,7 +145,8 @@ def _renew(tile: Tile, m: Arrays, w: Work, newton: Newton, z: Array, mass_factor
             copy(tile, matrix, tangent.held.slot[e], w.gauss.jacobian, e)
         # Pivots are squares of distances from singular, whose round-off is that of the tangent.
         tolerance = max(newton.rank_tolerance**2, 1e-13)
-        saddle.eliminate(tile, tangent.pattern, tangent.held.multiplier, matrix, tolerance)
+        # Distances in the metric of the tangent are not recorded; x is free until the right-hand side is put there.
+        saddle.eliminate(tile, tangent.pattern, tangent.held.multiplier, matrix, tolerance, newton.x)
     memory[RENEW], memory[AGE], memory[MASS], memory[DAMPING] = memory[FULL], 0.0, mass_factor, damping_factor
 
 

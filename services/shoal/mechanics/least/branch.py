@@ -43,7 +43,7 @@ VELOCITY, ACCELERATION = 1, 2
 """What the tangent is: the derivative of the coordinates of this order."""
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def follow(
     tile: Tile,
     m: Arrays,
@@ -68,9 +68,12 @@ def follow(
         w.branch[i * width + lane] = v[i * width + lane]
         speed = max(speed, abs(v[i * width + lane]))
     if speed > 0.0:
-        rank, off = _approach(tile, m, w, s, t, lane, first, VELOCITY)
+        for k in range(m.constraints.size):
+            s.shift[k] = 0.0
+        rank, off = _rows(tile, m, w, s, t, lane, first, VELOCITY, True, s.shift)
         if rank == first and off <= ON_CONE:
             return first, False  # redundant everywhere
+        rank, off = _approach(tile, m, w, s, t, lane, first, VELOCITY)
         away = _difference(width, n, lane, w.branch, v)
         if off > ON_CONE or away > AWAY * speed:
             _accelerate(tile, m, w, s, forces, lane, first)
@@ -237,7 +240,7 @@ def _rows(
     return rank, off
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def _is_new(width: int, n: int, lane: int, first: int, s: LaneWork, row: Array, share: float) -> bool:
     """Return whether more than this share of a row of one lane is independent of the constraints."""
     for i in range(n):
@@ -265,7 +268,7 @@ def _accelerate(tile: Tile, m: Arrays, w: GaussWork, s: LaneWork, forces: Array,
     sparse.backward(tile, m.pattern, m.mass_factor, m.mass_root, w.extra, 0)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def _largest(width: int, n: int, lane: int, x: Array) -> float:
     """The largest entry of one lane by size."""
     largest = 0.0
@@ -274,7 +277,7 @@ def _largest(width: int, n: int, lane: int, x: Array) -> float:
     return largest
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def _difference(width: int, n: int, lane: int, x: Array, y: Array) -> float:
     """The largest difference of entries of one lane."""
     largest = 0.0

@@ -118,7 +118,8 @@ def _prepare(tile: Tile, m: Arrays, w: GaussWork) -> bool:
     if m.saddle.size > 0:
         c = m.constraints
         tolerance = saddle.SETTLED if m.saddle.many else saddle.REGULAR
-        if saddle.factor(tile, m.saddle, c.entry[c.size], w.jacobian, w.saddle, tolerance) == 0 or m.saddle.many:
+        entries = c.entry[c.size]
+        if saddle.factor(tile, m.saddle, entries, w.jacobian, w.saddle, tolerance, w.closeness) == 0 or m.saddle.many:
             return True
     rows(tile, m, w)
     return False

@@ -55,7 +55,7 @@ def constrain(tile: Tile, m: Arrays, w: GaussWork, t: float, v: Array, a: Array)
     c = m.constraints
     entries = c.entry[c.size]
     tolerance = saddle.SINGULAR if m.saddle.many else saddle.REGULAR
-    dropped = saddle.factor(tile, m.saddle, entries, w.jacobian, w.saddle, tolerance)
+    dropped = saddle.factor(tile, m.saddle, entries, w.jacobian, w.saddle, tolerance, w.closeness)
     if dropped > 0 and not m.saddle.many:
         return False
     solve(tile, m, w, a, w.gap, a, w.multiplier)

@@ -13,7 +13,7 @@ from shoal.errors import InputError
 from shoal.mechanics import constraints
 from shoal.mechanics.derived import derive
 from shoal.mechanics.least import alternatives, branch, lent, many, projection, together
-from shoal.mechanics.least.work import HERE, PASSED, GaussWork, lane_work, load_lane, rows
+from shoal.mechanics.least.work import HERE, GaussWork, lane_work, load_lane, rows
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics import sparse
 from shoal.mechanics.numerics.tile import Array, Tile
@@ -78,6 +78,7 @@ def constrain(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array,
                 turned = turned or _turn(tile, m, w, v)
                 rank = rank if _are_redundant(tile, m, w, v, lane, rank) else together.ALONE
             if rank != together.ALONE:
+                together.raise_closeness(w.group, rank, count, lane, w.closeness)
                 together.move(w.group, rank, count, n, width, lane, w.gap, a)
                 lent.take_back_from_group(tile, m, w, lane, rank, a)
                 together.multipliers(w.group, rank, count, width, lane, w.multiplier)
@@ -90,10 +91,8 @@ def constrain(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array,
         if orthogonal:
             near = tolerance * (LEAVING if w.near[lane] == HERE else 1.0)
             rank = projection.orthonormalise(s.rows, s.triangle, s.norms, s.order, near)
-            if projection.left(rank, s.rows) > ROUND_OFF:
-                w.near[lane] = HERE
-            elif w.near[lane] == HERE:
-                w.near[lane] = PASSED
+            left = projection.left(rank, s.rows)
+            w.near[lane] = HERE if left > ROUND_OFF else 0.0
             first = rank
             projection.components(rank, s.triangle, s.norms, s.order, s.weights, s.wanted)
             locked = False
@@ -101,6 +100,10 @@ def constrain(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array,
                 turned = False
                 rank, locked = branch.follow(tile, m, w, s, t, v, a, lane, rank, tolerance)
                 w.near[lane] = HERE if locked or rank > first else w.near[lane]
+            distance = s.triangle[first - 1, first - 1] if first > 0 else 1.0
+            if w.near[lane] == HERE:
+                distance = max(left, ROUND_OFF)
+            w.closeness[lane] = max(w.closeness[lane], 1.0 / distance**2)
             projection.move(rank, s.rows, s.wanted, s.y)
             lent.take_back_from_lane(tile, m, w, s, lane, rank, orthogonal)
             if locked:

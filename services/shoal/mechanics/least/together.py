@@ -128,6 +128,14 @@ def orthonormalise(w: GroupWork, count: int, n: int, width: int, lane: int, give
     return count
 
 
+@njit(cache=True, error_model="numpy")
+def raise_closeness(w: GroupWork, rank: int, count: int, lane: int, closeness: Array) -> None:
+    """Raise the inverse square of the smallest distance from singular, (width,), to that of the last basis row."""
+    if rank > 0:
+        length = load(EIGHT, w.triangle, ((rank - 1) * count + w.order[rank - 1]) * len(EIGHT))
+        store(closeness, lane, larger(load(EIGHT, closeness, lane), 1.0 / (length * length)))
+
+
 @njit(error_model="numpy", forceinline=True)
 def _are_gone(w: GroupWork, rank: int, count: int, tolerance: float) -> bool:
     """Return whether nothing is left of the rows beyond a rank in any lane."""

@@ -16,8 +16,8 @@ from shoal.mechanics.numerics import sparse
 from shoal.mechanics.numerics.tile import Array, Index, Tile
 from shoal.mechanics.saddle import SaddleWork
 
-HERE, PASSED = 1.0, 2.0
-"""Of a lane that is at a singular position, or has been at one."""
+HERE = 1.0
+"""Of a lane that is at a singular position."""
 UNENDED = -1.0
 """Of a lane that moves on: neither an instant nor the number of a constraint."""
 
@@ -45,8 +45,10 @@ class GaussWork(NamedTuple):
     jacobian, turning: C_q and dC_q/dt (entries, lanes). response: C_q' or H^-1 C_q' (constraints * unknowns, lanes).
     gram: (constraints^2, lanes). multiplier, gap: (constraints, lanes). extra, moved, lent: (unknowns, lanes), for
     the two last see `lent`. branch: tangent of the motion at a singular position, (rows, lanes). near: whether a lane
-    is at a singular position, HERE, or was, PASSED, else 0, (lanes,). ended: by lane the instant [s] from which its
-    motion is no number, then the constraint that could not be closed, or UNENDED.
+    is at a singular position, HERE, else 0, (lanes,). closeness: inverse square of the smallest distance from singular
+    positions so far, what is left of a row without the others as a part of its length, (lanes,); 0: not known. ended:
+    by lane the instant [s] from which its motion is no number, then the constraint that could not be closed, or
+    UNENDED.
     """
 
     jacobian: Array
@@ -60,6 +62,7 @@ class GaussWork(NamedTuple):
     lent: Array
     branch: Array
     near: Array
+    closeness: Array
     ended: Array
     lane: LaneWork
     group: GroupWork
@@ -77,7 +80,7 @@ def work_space(width: int, m: Arrays) -> GaussWork:
     first = np.zeros((count, n)), np.zeros((count, count)), np.zeros(count), order, wanted, weights, shift
     lane = LaneWork(*first, np.zeros(n), np.zeros(n))
     group, room = together.room(width, count, n), saddle.room(m.saddle.size, m.saddle.slots, width)
-    vectors = multiplier, gap, extra, moved, lent, branch, np.zeros(width), np.full(2 * width, UNENDED)
+    vectors = multiplier, gap, extra, moved, lent, branch, np.zeros(width), np.zeros(width), np.full(2 * width, UNENDED)
     return GaussWork(jacobian, turning, response, gram, *vectors, lane, group, room)
 
 
