@@ -18,14 +18,14 @@ from shoal.trajectory import Array
 
 @dataclass(frozen=True)
 class Answer:
-    """What was found, and the problem it answers. The native engine looks around it, whichever was fitted."""
+    """An estimate and its problem. Runs around it use the native engine, also where another one was fitted."""
 
     problem: Problem
     estimate: Estimate
 
     @cached_property
     def model(self) -> ForwardModel:
-        """The forward model on the scene of the answer; its runs are nobody's evaluations."""
+        """The forward model on the scene of the answer; its runs are not counted as evaluations."""
         estimate, nominal = self.estimate, self.problem.load_scene()
         # Fields that are different in the first recording must not be carried over to the others.
         known = estimate.measurement.first.stated.known

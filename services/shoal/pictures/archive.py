@@ -19,7 +19,7 @@ _ARRAY = "array"
 
 
 class _Archived(BaseModel):
-    """What `record` of the file holds."""
+    """Content of `record` in the file."""
 
     model_config = ConfigDict(arbitrary_types_allowed=True, ser_json_inf_nan="strings")
     problem: Problem
@@ -27,7 +27,7 @@ class _Archived(BaseModel):
 
 
 def archived(answer: Answer) -> dict[str, Any]:
-    """What `shoal identify --json` prints, and below `record` all that a page needs."""
+    """Return the object of `shoal identify --json`, and below `record` all that a page needs."""
     record = _Archived(problem=answer.problem, estimate=answer.estimate).model_dump_json(fallback=_listed)
     return {**answer.estimate.to_json(), "record": json.loads(record)}
 
@@ -59,7 +59,7 @@ def parse(text: str, source: str) -> Answer:
 
 
 def _listed(value: Any) -> Any:
-    """What pydantic does not know, as JSON has it."""
+    """Return values that pydantic does not know as JSON holds them."""
     if isinstance(value, np.ndarray):
         return {_ARRAY: value.tolist()}
     if isinstance(value, np.generic):

@@ -1,4 +1,4 @@
-"""How a model was chosen, in words and as the rows of a table, and whether its places may be told."""
+"""Selection of a model, in words and as the rows of a table, and whether its positions may be shown."""
 
 from __future__ import annotations
 
@@ -14,9 +14,7 @@ if TYPE_CHECKING:
 
 
 def tells_places(motion: Trajectory, found: Selection | None = None) -> bool:
-    """Return whether places of markers may be told: of a run that is believed, or misses a tolerance by a known
-    error.
-    """
+    """Return whether positions may be shown: of a run that is accepted, or misses a tolerance by a known error."""
     return motion.ok or (found is not None and bool(np.isfinite(found.chosen.error)))
 
 

@@ -23,7 +23,7 @@ Columns = dict[str, tuple[Any, str]]
 
 
 def of_motion(motion: Trajectory) -> Columns:
-    """Time, place, angle and, where the engine tells them, velocity and rate of every marker of one lane."""
+    """Return time, position, angle and, where the engine has them, velocity and rate of every marker of one lane."""
     found: Columns = {"t": (motion.times, "s")}
     for name in motion.markers:
         found |= {f"{name}.{axis}": (x, "m") for axis, x in zip(motion.axes, motion.marker(name).T, strict=True)}
@@ -52,7 +52,7 @@ def about_motion(motion: Trajectory, scene: Scene) -> dict[str, str | float]:
 
 
 def _errors(errors: ErrorBudget) -> dict[str, float | None]:
-    """The sum of what is known, and its parts [m]."""
+    """Return the sum of the known errors, and its parts [m]."""
     return {"error_m": errors.total, **{f"{source}_error_m": error for source, error in errors.estimates.items()}}
 
 
@@ -83,7 +83,7 @@ def _column(values: list[Any]) -> Any:
 
 
 def about_sweep(result: Sweep) -> dict[str, str | float]:
-    """As of a motion."""
+    """Return the attributes of a sweep, as of a motion."""
     told = {
         **_about(result.scene, result.engine, "ok" if result.ok else "failed", result.message),
         "time_s": result.time,
@@ -122,9 +122,9 @@ def motion_to_netcdf(motion: Trajectory, scene: Scene) -> bytes:
 
 
 def sweep_to_netcdf(result: Sweep) -> bytes:
-    """Over point and marker: positions and displacements; over point: the values, the status, and why it is not ok.
+    """Write a sweep as NetCDF: positions and displacements over point and marker; values, status and reason over point.
 
-    And where points start that do not keep what is stated.
+    Also the starts of points that do not keep a stated value.
     """
     import xarray as xr
 

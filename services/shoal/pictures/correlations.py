@@ -1,4 +1,4 @@
-"""Which parameters the data tell apart only together."""
+"""Correlation matrix of the parameters."""
 
 from __future__ import annotations
 

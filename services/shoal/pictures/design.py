@@ -1,4 +1,4 @@
-"""What each marker would tell, and what a longer measurement gains."""
+"""Optimal experiment design: the information of each sensor, and the gain of a longer measurement."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def design(found: Design) -> Figure:
 
 
 def shown(found: Design) -> list[int]:
-    """Of the sensors: the best of every kind, and of the others the best, as far as there is room; by rank."""
+    """Return the sensors to draw: the best of every kind, then the best of the others, by rank."""
     first = {sensor.quantity: k for k, (sensor, _) in reversed([*enumerate(found.ranked)])}
     best = sorted(first.values())
     others = (k for k in range(len(found.ranked)) if k not in best)
@@ -78,12 +78,12 @@ def _durations(panel: Axes, found: Design, rows: list[int]) -> None:
 
 
 def score_of(found: Design) -> str:
-    """What is compared, in words."""
+    """Describe the criterion of the comparison."""
     return f"std of {found.aim.parameter} / range" if found.aim.parameter else "largest std / range"
 
 
 def says(found: Design) -> str:
-    """What to measure, in a line."""
+    """Return the best measurement in a line."""
     best, precision = found.ranked[0]
     gain = found.aim.score(found.now) / found.aim.score(precision)
     parts = [f"{found.problem}: measure {best.label}"]

@@ -1,4 +1,4 @@
-"""What to measure as one page that needs nothing else: every sensor and what it is worth beside what is there."""
+"""Page of an experiment design, self-contained: every sensor and its gain over the present ones."""
 
 from __future__ import annotations
 

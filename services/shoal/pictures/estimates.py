@@ -1,4 +1,4 @@
-"""What is known of the errors of a run, in words."""
+"""Known errors of a run, in words."""
 
 from __future__ import annotations
 

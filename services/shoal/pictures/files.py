@@ -231,5 +231,5 @@ def _plotted(result: Estimate | Sweep | Comparison | Equilibrium | Campbell) -> 
 def _json(
     result: Trajectory | Design | Sweep | Comparison | Response | Equilibrium | Modes | Campbell,
 ) -> Callable[[], str]:
-    """What `--json` prints, one number a line."""
+    """Return the writer of the JSON of `--json`, one number a line."""
     return lambda: json_text(result.to_json(), indent=1)

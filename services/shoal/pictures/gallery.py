@@ -75,7 +75,7 @@ def model_choice(answer: Answer) -> Drawn:
 
 
 def _around(answer: Answer) -> list[Drawn]:
-    """What needs runs around the answer."""
+    """Draw the pictures that need runs around the answer."""
     pair = strongest(answer)
     one, other = (answer.names[k] for k in pair)
     drawn = []

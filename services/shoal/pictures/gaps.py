@@ -1,4 +1,4 @@
-"""How well bounds are known over time, beside what mesh and step are off by."""
+"""Gap between outer and attained bounds over time, with the errors of mesh and step."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def gaps(found: Response, marker: str) -> Figure:
 
 
 def _known(found: Response) -> tuple[str, Array, Array]:
-    """What the gap is a share of, that, and the distance of the outer bounds, (columns,) each."""
+    """Return the name and size of the reference of the gap, and the distance of the outer bounds, (columns,) each."""
     bounds: Bounds | Ends
     if found.boxes is None:
         assert found.bounds is not None

@@ -1,4 +1,4 @@
-"""Which parameters a marker's scatter is owed to, over time."""
+"""Sobol indices of a marker over time."""
 
 from __future__ import annotations
 

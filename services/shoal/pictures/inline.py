@@ -1,4 +1,4 @@
-"""What a notebook shows of a scene, a motion or an answer: one sentence, one table, one picture."""
+"""Display in notebooks of scenes, motions and answers: one sentence, one table, one picture."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Picture:
 
 @singledispatch
 def plot(result: Any) -> Picture:
-    """Of a scene (its motion), a trajectory, a place of rest, an estimate, a sweep, a comparison. Raises InputError."""
+    """Draw a scene (its motion), a trajectory, a rest position, an estimate, a sweep, a comparison. Raises InputError."""
     raise InputError(f"plot: there is no picture of a {type(result).__name__}")
 
 
@@ -116,7 +116,7 @@ def _(scene: Scene) -> str:
 
 @html.register
 def _(trajectory: Trajectory) -> str:
-    """Where the markers end, and whether that can be trusted; of several lanes the first."""
+    """Summarise the end of a motion, and whether it is accepted; of several lanes the first."""
     end, trust = float(trajectory.times[-1]), f"status {trajectory.status[0]}, {trajectory.errors.brief}"
     several = f"the first of {trajectory.lanes} lanes, " if trajectory.lanes > 1 else ""
     message = f" ({trajectory.message})" if trajectory.message else ""

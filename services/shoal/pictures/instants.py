@@ -1,6 +1,6 @@
-"""What is known at some instants, over time: curves and bands, or, where the instants are few, marks and bars at each.
+"""Values at instants over time: curves and bands, or, where the instants are few, marks and bars at each.
 
-Nothing is known between instants: a line or a band through few of them would state what nobody has looked at.
+A line or a band through few instants would suggest values between them that were not computed.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def curve(axes: Axes, times: Array, values: Array, **look: Any) -> None:
 
 
 def band(axes: Axes, times: Array, lower: Array, upper: Array, **look: Any) -> None:
-    """What lies between two values at these times [s]; what is not finite is left out."""
+    """Fill the area between two values at these times [s]; values that are not finite are left out."""
     if len(times) <= FEW:
         axes.use_sticky_edges = False  # a bar would stand on the edge of the picture
         axes.bar(times, upper - lower, _width(times), bottom=lower, **{"edgecolor": look["color"], **look})
@@ -41,6 +41,6 @@ def time_axis(axes: Axes, times: Array) -> None:
 
 
 def _width(times: Array) -> float:
-    """Of a bar [s]: neighbours do not touch."""
+    """Return the width of bars [s]: neighbours do not touch."""
     whole = WIDTH * float(times[-1] - times[0] or times[0] or 1.0)
     return min(whole, 0.8 * float(np.min(np.diff(times), initial=np.inf)))

@@ -1,4 +1,4 @@
-"""Where a chosen model stands between cost and error, among the models that were tried."""
+"""Cost and error of the chosen model among the models that were tried."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the mesh of the model does to the answer, and whether the estimate knew."""
+"""Effect of the mesh on the identified values, and the estimate of it."""
 
 from __future__ import annotations
 

@@ -185,7 +185,7 @@ def _place(found: dict[str, Array], view: dict[str, float]) -> Array:
 
 
 def plain_motion(found: Motion) -> dict[str, Any]:
-    """As plain numbers for a script in a page, rounded to a ten-thousandth of the machine's size."""
+    """Return plain numbers for a script in a page, rounded to a ten-thousandth of the machine's size."""
     (low, high), size = found.box, found.size
     digits = max(0, 4 - int(np.floor(np.log10(size)))) if size > 0 else 6
     space = {} if found.up is None else _plain_space(found, digits)

@@ -1,4 +1,4 @@
-"""Which places of a scene make its bodies visible: points along rods, the joints of other bodies, fixed ground."""
+"""Points of a scene that make its bodies visible: points along rods, the joints of other bodies, fixed ground."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ def overlay(estimate: Estimate, title: str = "") -> Figure:
 
 
 def follows(estimate: Estimate) -> str:
-    """How closely the fit follows the data, in words."""
+    """Describe how closely the fit follows the data."""
     sizes: dict[str, list[float]] = {}
     for signal in signals(estimate):
         sizes.setdefault(signal.unit, []).append(signal.rms)

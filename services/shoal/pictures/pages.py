@@ -1,4 +1,4 @@
-"""What all pages share: the templates in `page`, the data of a motion, what a number was computed with."""
+"""Common parts of pages: the templates in `page`, the data of a motion, the provenance of numbers."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def render(template: str, **content: Any) -> str:
 
 
 def animation(found: Motion, what: str) -> dict[str, Any]:
-    """What the macro `animation` takes; what: the machine in words."""
+    """Return the arguments of the macro `animation`; what: the machine in words."""
     shown = [f"{what} (blue) with its markers (red-orange)"]
     if found.measured:
         shown.append("the measured places (black circles)")
@@ -73,7 +73,7 @@ def animation(found: Motion, what: str) -> dict[str, Any]:
 
 
 def settings(model: Mapping[str, Any]) -> str:
-    """What a model was made with, in words; bodies that are made alike stand together."""
+    """Describe the settings of a model; bodies with equal settings stand together."""
     parts = [f"{name} = {_number(value)}" for name, value in model.items() if not isinstance(value, dict | None)]
     alike: dict[str, list[str]] = {}
     for name, body in model.get("bodies", {}).items():

@@ -1,4 +1,4 @@
-"""Where the markers of a simulated machine are, against time."""
+"""Positions of the markers of a simulated machine over time."""
 
 from __future__ import annotations
 

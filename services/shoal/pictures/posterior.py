@@ -55,7 +55,7 @@ def shown(found: Posterior) -> list[str]:
 
 
 def says(estimate: Estimate) -> str:
-    """How much the draws are worth, in words."""
+    """Describe the diagnostics of the draws."""
     found = estimate.posterior
     assert found is not None
     state = "converged" if found.converged else "NOT converged"

@@ -1,4 +1,4 @@
-"""What was held out of a fit: measured against predicted, and the error against the band that the estimate states."""
+"""Held-out data: measured and predicted, and the error within the predicted band."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def prediction(estimate: Estimate) -> Figure:
 
 
 def told(estimate: Estimate) -> str:
-    """How many windows came out as the estimate states, in words."""
+    """Describe how many windows agree with their prediction."""
     inside = [one.inside for one in estimate.prediction]
     if len(inside) == 1:
         kinds = {True: "is predicted as stated", False: "is predicted worse than stated", None: "has no stated error"}

@@ -1,4 +1,4 @@
-"""How probable it is that a limit has been passed, over time."""
+"""Probability that a limit has been exceeded, over time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How far each parameter can be moved before the data object, all others readjusted."""
+"""Profile likelihood of each parameter, all others fitted again."""
 
 from __future__ import annotations
 

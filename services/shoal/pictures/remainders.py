@@ -1,4 +1,4 @@
-"""What each method leaves unexplained."""
+"""Residuals of each method."""
 
 from __future__ import annotations
 

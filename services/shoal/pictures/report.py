@@ -32,7 +32,7 @@ def report(answer: Answer, moving: list[Motion] | None = None, drawn: list[Drawn
 
 
 def findings(answer: Answer, moving: list[Motion] | None = None, drawn: list[Drawn] | None = None) -> dict[str, Any]:
-    """What findings.html.j2 takes: answer, motion and evidence. Raises InputError."""
+    """Return the data of findings.html.j2: answer, motion and evidence. Raises InputError."""
     moving = motions(answer) if moving is None else moving
     drawn = gallery(answer, moving) if drawn is None else drawn
     estimate = answer.estimate
@@ -66,7 +66,7 @@ def shown(estimate: Estimate, value: Value) -> tuple[str, str, str, str]:
 
 
 def provenance(estimate: Estimate) -> list[tuple[str, str]]:
-    """Where the numbers come from and what they cost."""
+    """Return the provenance and the cost of the numbers."""
     model = dict(estimate.model)
     if stages := model.pop("selection", None):
         # What was chosen took the place of what the scene states.

@@ -1,4 +1,4 @@
-"""What the fit leaves of each channel: against the noise, and how far it remembers itself."""
+"""Residuals of each channel: against the noise, and their autocorrelation."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def autocorrelation(residual: Array, most: int = _LAGS) -> Array:
 
 
 def white(estimate: Estimate) -> str:
-    """What the tests of the verdict say of the residuals' correlation, and how many lags lie outside the band."""
+    """Describe the verdict's tests of the residuals' correlation, and how many lags lie outside the band."""
     counts = [_outside(signal) for signal in signals(estimate)]
     outside, lags = sum(o for o, _ in counts), sum(n for _, n in counts)
     tests = estimate.residual_tests

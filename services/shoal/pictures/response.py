@@ -1,4 +1,4 @@
-"""Where a marker may be over time: the band between its bounds, or the fan of its quantiles."""
+"""Uncertain positions of a marker over time: the band between its bounds, or the fan of its quantiles."""
 
 from __future__ import annotations
 

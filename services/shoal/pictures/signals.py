@@ -21,7 +21,7 @@ LONG = 1.9
 class Signal:
     """One channel of one recording: times by its clock [s], measured (nan in gaps) and fitted values, all (samples,).
 
-    noise: standard deviation as stated, else as the differences of the data tell it
+    noise: standard deviation as stated, else estimated from differences of the data
     name: channel, and recording where there are several
     """
 
@@ -47,7 +47,7 @@ class Signal:
 
     @property
     def unit(self) -> str:
-        """Of the values."""
+        """Return the unit of the values."""
         return of_channel(self.channel)
 
     @property

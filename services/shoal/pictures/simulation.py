@@ -32,7 +32,7 @@ def simulation(trajectory: Trajectory, scene: Scene, selection: Selection | None
 
 
 def drawn(trajectory: Trajectory, scene: Scene, moving: Motion, selection: Selection | None = None) -> list[Drawn]:
-    """What the page shows on paper: poses, paths and, of a chosen model, the ladder."""
+    """Draw the pictures of the page: poses, paths and, of a chosen model, the candidates."""
     pictures = [_poses(trajectory, scene, moving), _paths(trajectory, scene, moving)]
     if selection is not None:
         tried, name = len(selection.candidates), selection.chosen.name
@@ -88,7 +88,7 @@ def _lead(trajectory: Trajectory, selection: Selection | None) -> str:
 
 
 def _is_flat(trajectory: Trajectory) -> bool:
-    """Return whether one angle tells how a body is turned."""
+    """Return whether one angle defines the rotation of a body."""
     return trajectory.axes == "xy"
 
 

@@ -1,4 +1,4 @@
-"""What makes a machine in space visible beside its lines: bars with their sections, joined places, axes of joints."""
+"""Solids of a machine in space: bars with their sections, joints, axes of joints."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ At = Callable[[str], Array]
 
 @dataclass(frozen=True)
 class Bar:
-    """A bar of rectangular section, or of round section where nothing tells how it is turned about its axis.
+    """A bar of rectangular section, or of round section where its rotation about its axis is unknown.
 
     axis: points along it [m], (frames, points, 3); side: unit vector along the height of its section, (frames, 1, 3),
     or one for each point; size: height and width at each point [m], (points, 2)
@@ -50,7 +50,7 @@ class Bar:
 
 
 class Solids:
-    """The scene with the markers that tell where bars, joined places and axes are.
+    """The scene with markers at bars, joints and axes.
 
     Markers do not change a model: bodies have their coordinates from joints.
     """
@@ -106,7 +106,7 @@ class Solids:
         return lambda at: _bar(at, ends, side, size, float(sides[0]), stands_for=True)
 
     def _place(self, side: Attachment) -> Callable[[At], Array] | None:
-        """Where an attachment is; None for a moving point of the ground."""
+        """Return the position of an attachment; None for a moving point of the ground."""
         if side.body != GROUND:
             name = self._add(side.body, self._original.location(side))
             return lambda at: at(name)

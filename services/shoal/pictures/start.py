@@ -1,4 +1,4 @@
-"""What the start of a run needs to have said about it, and why points of a sweep are not ok, in words."""
+"""Remarks on the start of a run, and reasons of failed points of a sweep, in words."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def remarks(model: Mapping[str, Any], ok: bool = True) -> list[str]:
 
 
 def reasons(sweep: Sweep) -> list[str]:
-    """Why points of a sweep are not ok, and how many for each reason, the most frequent first."""
+    """Return the reasons of failed points of a sweep, with their numbers, the most frequent first."""
     counted = Counter(filter(None, sweep.reasons)).most_common()
     found = [f"{number} point{'s' * (number > 1)}: {reason}" for reason, number in counted[:REASONS]]
     return found + ([f"{len(counted) - REASONS} more reasons"] if len(counted) > REASONS else [])

@@ -1,4 +1,4 @@
-"""One look for every picture: colours that colour-blind readers tell apart, room for a message in the title."""
+"""One look for every picture: colours that colour-blind readers can distinguish, room for a message in the title."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def canvas(height: float = 4.2, **layout: Any) -> tuple[Figure, Any]:
 
 
 def headline(figure: Figure, text: str) -> None:
-    """What a picture says, above all its axes; folded so that nothing is cut off."""
+    """Set the title above all axes, folded so that nothing is cut off."""
     figure.suptitle(fill(_UNIT.sub(_HARD, text), _WIDTH), x=0.01, ha="left", fontsize=12.5, fontweight="bold")
 
 

@@ -1,4 +1,4 @@
-"""Where a marker has moved to, over a grid of values: the paper's Figure 4."""
+"""Displacement of a marker over a grid of values: the paper's Figure 4."""
 
 from __future__ import annotations
 

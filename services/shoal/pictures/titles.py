@@ -1,4 +1,4 @@
-"""What a picture says, in its title: sentences from the numbers that it shows."""
+"""Titles of pictures: sentences from the numbers that they show."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def best(estimates: Mapping[str, Estimate]) -> Estimate:
 
 
 def pays(name: str, estimates: Mapping[str, Estimate]) -> str:
-    """How many runs the cheapest and the dearest of the good methods need."""
+    """Return the numbers of runs of the cheapest and the dearest good method."""
     level = _AS_GOOD * min(e.fitness for e in estimates.values())
     good = sorted((e.evaluations, e.method) for e in estimates.values() if e.fitness <= level)
     if len(good) < 2:
@@ -33,7 +33,7 @@ def pays(name: str, estimates: Mapping[str, Estimate]) -> str:
 
 
 def leaves(name: str, estimates: Mapping[str, Estimate]) -> str:
-    """Who found the minimum and who did not."""
+    """Return which methods found the minimum and which did not."""
     level = _AS_GOOD * min(e.fitness for e in estimates.values())
     short = [e.method for e in estimates.values() if e.fitness > level]
     if not short:
@@ -42,26 +42,26 @@ def leaves(name: str, estimates: Mapping[str, Estimate]) -> str:
 
 
 def refines(name: str, estimates: Mapping[str, Estimate]) -> str:
-    """What the finest mesh gains on the coarsest."""
+    """Return the gain of the finest mesh over the coarsest."""
     labels = list(estimates)
     first, last = (_error(estimates[labels[k]]) for k in (0, -1))
     return f"{name}: {labels[0]} is off by {first:.2g}°, {labels[-1]} by {last:.2g}°"
 
 
 def ends(name: str, found: Motion, errors: ErrorBudget | None = None) -> str:
-    """Where the last marker is at the end of a motion, and how far that may be off as far as it is known."""
+    """Return the final position of the last marker, and its known error."""
     marker, path = list(found.markers.items())[-1]
     place = f"({', '.join(f'{x:.3g}' for x in path[-1])})".replace("-", "−")
     return f"{name}: {marker} is at {place} m after {found.times[-1]:.3g} s{_known(errors)}"
 
 
 def rejected(name: str, trajectory: Trajectory) -> str:
-    """Of a run whose places mean nothing."""
+    """Return the title of a rejected run."""
     return f"{name}: not to be trusted ({trajectory.status[0]})"
 
 
 def reaches(name: str, found: Motion, errors: ErrorBudget | None = None) -> str:
-    """How far the marker that moves most goes."""
+    """Return the range of the marker that moves most."""
     spans = {marker: np.ptp(path, axis=0) for marker, path in found.markers.items()}
     marker = max(spans, key=lambda one: float(np.max(spans[one])))
     *first, last = (f"{length(float(span))} in {axis}" for span, axis in zip(spans[marker], "xyz", strict=False))
@@ -73,7 +73,7 @@ def _known(errors: ErrorBudget | None) -> str:
 
 
 def agrees(comparison: Comparison, marker: str) -> str:
-    """How far apart the engines come out at a marker."""
+    """Return the distance of the engines at a marker."""
     found = [row["largest"] for row in comparison.differences() if row["marker"] == marker]
     if not found or None in found:
         return f"{comparison.scene.name}: {marker} by each engine"

@@ -73,7 +73,7 @@ def _lead(found: Response) -> str:
 
 
 def _largest(found: Response, of: Array) -> tuple[float, str]:
-    """Of all coordinates [m], and its marker."""
+    """Return the largest value of all coordinates [m], and its marker."""
     return max((float(found.column(marker, axis, of).max()), marker) for marker in found.markers for axis in found.axes)
 
 
@@ -171,7 +171,7 @@ def _allocation(found: Response) -> list[list[str]]:
 
 
 def _allocated(found: Response) -> list[str]:
-    """What tolerances do, in words."""
+    """Describe the allocated tolerances."""
     told = found.allocation
     if told is None:
         return []

@@ -16,12 +16,12 @@ def labelled(path: str | None, name: str = "") -> str:
 
 
 def rms_unit(estimate: Estimate) -> str:
-    """Of a root mean square over all channels."""
+    """Return the unit of a root mean square over all channels."""
     return of_channels(estimate.measurement) or _MIXED
 
 
 def fitness_unit(estimate: Estimate) -> str:
-    """Of a mean square over all channels."""
+    """Return the unit of a mean square over all channels."""
     unit = rms_unit(estimate)
     return unit if unit == _MIXED else squared(unit)
 

@@ -29,7 +29,7 @@ class View:
 
     @property
     def labels(self) -> tuple[str, str]:
-        """What the coordinates on the paper are called; nothing where they are along no axis."""
+        """Return the names of the coordinates on the paper; empty where they are along no axis."""
         return _label(self.right), _label(self.up)
 
 

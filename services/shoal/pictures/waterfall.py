@@ -1,4 +1,4 @@
-"""How many different answers fit, and how much worse the others are."""
+"""Local minima found, and how much worse they fit than the best."""
 
 from __future__ import annotations
 
