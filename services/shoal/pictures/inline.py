@@ -50,7 +50,7 @@ class Picture:
 
 @singledispatch
 def plot(result: Any) -> Picture:
-    """Draw a scene (its motion), a trajectory, a rest position, an estimate, a sweep, a comparison. Raises InputError."""
+    """Draw a scene (its motion), trajectory, equilibrium, estimate, sweep or comparison. Raises InputError."""
     raise InputError(f"plot: there is no picture of a {type(result).__name__}")
 
 
