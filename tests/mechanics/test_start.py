@@ -541,3 +541,23 @@ def test_rounded_places_of_a_machine_that_holds_itself_twice_are_said_to_be_roun
         InputError, match=r"p\d would stay .* m apart, as rounded places or lengths do; state them with"
     ):
         complete(Scene.parse(scene(bodies, {**feet, **heads}) | {"initial": start}))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_places_that_differ_by_rounding_only_are_no_measure_of_a_machine(seed: int) -> None:
+    """A point that a coupling sets to the sum of others, which are at one place up to the last digits."""
+    random = np.random.default_rng(seed)
+    count, place = int(random.integers(2, 9)), float(random.uniform(0.1, 100.0))
+    places = place * (1.0 + 10.0 ** random.uniform(-16, -3) * random.normal(size=count))
+    names = [f"p{k}" for k in range(count)]
+    terms = [{"at": {"body": name}, "axis": "x", "factor": -1.0} for name in names]
+    scene = Scene.parse({
+        "name": "sum",
+        "bodies": {name: {"kind": "point-mass", "mass": 1.0} for name in ("S", *names)},
+        "joints": {"c": {"kind": "coupling", "terms": [{"at": {"body": "S"}, "axis": "x"}, *terms]}},
+        "markers": {"S": {"body": "S"}},
+        "initial": {name: {"position": [float(x), 0.0]} for name, x in zip(names, places, strict=True)},
+    })  # fmt: skip
+    begun = complete(scene).scene.initial
+    assert begun["S"].position[0] == pytest.approx(places.sum(), rel=1e-9)
+    assert [begun[name].position[0] for name in names] == pytest.approx(places, rel=1e-9)

@@ -57,6 +57,23 @@ def test_a_wrong_worst_case_is_refused_before_the_study(of: str, known: Interval
         require_case(of, [], SCENE, Inputs((Parameter(UP, known, {UP: 1.0}),)).parameters)
 
 
+@pytest.mark.parametrize("known", ["normal(5,0.2)", "uniform(4.7,5.3)", (4.7, 5.3)])
+def test_a_refused_run_at_the_design_point_is_a_doubt_and_costs_no_answer(
+    known: str | tuple[float, float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(*_: object) -> None:
+        raise InputError("joints.c: cannot be assembled")
+
+    monkeypatch.setattr(importlib.import_module("shoal.response.limits.judge"), "show", refused)
+    found = uncertain(SCENE, {UP: known}, [0.5], limits=["P.y > 1.3"], limit_runs=300)
+    assert not found.ok
+    assert "cannot be assembled" in found.message
+    (told,) = found.to_json()["limits"]
+    assert told["shown_by"]["status"] == "refused"
+    assert told["shown_by"]["margin"] is None
+    assert found.bounds is not None or found.statistics is not None
+
+
 def test_a_wrong_cost_is_refused_before_the_study(monkeypatch: pytest.MonkeyPatch) -> None:
     module = importlib.import_module("shoal.response.uncertain")
     monkeypatch.setattr(module, "respond", lambda *_, **__: pytest.fail("the study was made"))

@@ -27,6 +27,11 @@ BREAKS = 5.0
 A run that gained energy without bound would else have no reach.
 """
 
+COINCIDENT = 1e-12
+"""Places that are apart by less, relative to their coordinates, are one: rounding of double precision."""
+RESOLVED = 1e-4
+"""Gaps of joints are computed to about 1e-15 of the coordinates, and closed to 1e-11 of the size of the machine."""
+
 
 def extents(scene: Scene) -> dict[str, Array]:
     """Largest distance [m] between two places of each body that have a name, a joint or a marker; () or (lanes,)."""
@@ -46,13 +51,20 @@ def size(scene: Scene) -> Array:
 def span(scene: Scene) -> float:
     """A length that displacements are compared with [m]; one metre where all places coincide.
 
-    All bodies stretched out in a line, or the distance between places on the ground and stated positions if it is more.
+    All bodies stretched out in a line, or the distance between places on the ground and stated positions if it is more;
+    where that is small beside their coordinates, so much of these that gaps can be computed relative to it.
     """
     joined = [side for joint in scene.joints.values() for side in places(joint)]
     loaded = [side for load in scene.loads.values() for side in sides(load).values()]
     fixed = [scene.location(side) for side in (*joined, *loaded) if side.body == GROUND]
     fixed += [start.position for start in scene.initial.values() if start.position is not None]
-    return float(max(np.max(size(scene)), np.max(_widest(fixed)))) or 1.0
+    found, coordinate = float(max(np.max(size(scene)), np.max(_widest(fixed)))), _largest(fixed)
+    return max(found, RESOLVED * coordinate) if found > COINCIDENT * coordinate else 1.0
+
+
+def _largest(found: list[Any]) -> float:
+    """The largest coordinate of some places [m]."""
+    return max((float(np.max(np.abs(number))) for place in found for number in place), default=0.0)
 
 
 def _widest(found: list[Any]) -> Array:

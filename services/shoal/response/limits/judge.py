@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from shoal.engines.contract import Engine
 from shoal.engines.verification import run_verified
+from shoal.errors import ComputationError, InputError
 from shoal.response.inputs import Inputs
 from shoal.response.limits.choice import get_way, probability
 from shoal.response.limits.judged import Judged, Shown
@@ -65,7 +67,17 @@ def require(machine: Machine, limit: Limit, inputs: Inputs) -> None:
 
 
 def _show(limit: Limit, machine: Machine, inputs: Inputs, germ: Array, verify: bool) -> Shown:
+    """Run the machine once more at a germ; a run that is refused costs the other answers nothing and is a doubt."""
     named = inputs.named(germ[None])[0]
+    try:
+        return _run_shown(limit, machine, inputs, named, verify)
+    except (InputError, ComputationError) as error:
+        values = dict(zip(inputs.names, named.tolist(), strict=True))
+        return Shown(values, inputs.at(named), math.nan, math.nan, "refused", str(error))
+
+
+def _run_shown(limit: Limit, machine: Machine, inputs: Inputs, named: Array, verify: bool) -> Shown:
+    """Raises InputError, ComputationError."""
     if verify:
         return show(limit, machine.scene, machine.times, machine.engine, inputs, named)
     scene = limit.scene(machine.scene.with_values(inputs.at(named)))
@@ -111,7 +123,7 @@ def judge(
     hidden = kept is None and _decided(lower, outer) is not None
     if shown.errors is not None and shown.errors.unknown:
         kept, hidden = None, True
-    if verify and kept is not False and 1 < len(times) < FINER:
+    if verify and shown.status == "ok" and kept is not False and 1 < len(times) < FINER:
         shown = replace(shown, between=_between(limit, machine, shown))
     return Judged(
         *(limit, "bounds", inputs, times, None, kept, float(lower[worst]), float((outer - off).min())),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -134,7 +135,8 @@ def _limit(judged: Judged) -> None:
     if shown is not None:
         known = ", ".join(f"{name} = {value:.6g}" for name, value in shown.parameters.items())
         error = f", {judged.errors.brief}" if judged.errors.estimates else ""
-        screen.say(f"  {how} {known}: margin {shown.margin:.3g} {judged.limit.unit} at {shown.time:g} s{error}")
+        margin = f"margin {shown.margin:.3g} {judged.limit.unit} at {shown.time:g} s{error}"
+        screen.say(f"  {how} {known}: {margin if math.isfinite(shown.margin) else shown.message}")
 
 
 def _between(title: str, judged: Judged, found: Between) -> None:
