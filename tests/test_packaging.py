@@ -157,7 +157,7 @@ def test_temporary_folder_that_others_can_fill_is_not_trusted(tmp_path: Path, mo
 
 def test_kernel_cache_follows_the_sources_and_the_compiler(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SHOAL_HOME", str(tmp_path / "home"))
-    for folder in ("mechanics", "engines/tree"):
+    for folder in ("compile", "mechanics", "engines/tree"):
         shutil.copytree(ROOT / "services/shoal" / folder, tmp_path / folder)
     before = home.kernel_cache().name
     assert home.kernel_cache(tmp_path).name == before

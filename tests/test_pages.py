@@ -185,8 +185,8 @@ def check(page: str, folder: Path, *, night: bool) -> None:
             session.close()
 
 
-BY_DAY = ("docs/notebook.md", "docs/tutorial.md")
-"""Pages that test_docs.py runs by day in its own process, which is quicker, with the figures that they state."""
+FIRST = "README.md"
+"""The page that is run by day; test_docs.py runs the tutorial and the notebook by day, with their figures."""
 
 
 def having(when: str) -> list[str]:
@@ -194,13 +194,12 @@ def having(when: str) -> list[str]:
     return [page for page in PAGES if any(b.language in RUN and b.when == when for b in blocks(page))]
 
 
-@pytest.mark.parametrize("page", [page for page in having("") if page not in BY_DAY])
-def test_a_page_by_day(page: str, tmp_path: Path) -> None:
-    check(page, tmp_path, night=False)
+def test_the_readme_by_day(tmp_path: Path) -> None:
+    check(FIRST, tmp_path, night=False)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("page", [*BY_DAY, *having("Tested at night")])
+@pytest.mark.parametrize("page", sorted({*having(""), *having("Tested at night")}))
 def test_a_page_at_night(page: str, tmp_path: Path) -> None:
     check(page, tmp_path, night=True)
 

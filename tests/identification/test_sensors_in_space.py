@@ -174,7 +174,7 @@ def test_load_cells_along_a_motion_show_the_reactions_at_its_instants(joint: dic
         np.testing.assert_allclose(row, np.concatenate(wanted), atol=1e-7 * max(1.0, np.max(np.abs(row))))
 
 
-@pytest.mark.parametrize("lanes", [1, 2])
+@pytest.mark.parametrize("lanes", [pytest.param(1, marks=pytest.mark.slow), 2])
 @pytest.mark.parametrize("law", ["friction", "drag", "coulomb"])
 def test_the_motor_of_a_hinge_works_against_the_resistance_of_its_lane(law: str, lanes: int) -> None:
     """M = I a + k w, k w |w| or k tanh(w/0.01) about an axis that is none of the ground's; the hinge has the rest."""

@@ -37,6 +37,7 @@ def model(function: Function) -> Callable[[Mapping[str, Array]], Answers]:
     return answers
 
 
+@pytest.mark.slow
 def test_a_deviation_is_that_of_runs_and_not_of_polynomials_beyond_them() -> None:
     """Of high degree they ran away where no run held them: 0.13 rad were told in place of 0.0013 rad, as known to 1e-6.
 

@@ -89,6 +89,7 @@ def test_random_chains(seed: int) -> None:
     judge(told(lambda v: chain(v, t), known), *moments(lambda v: chain(v, t), known, 401 if "k2" not in known else 41))
 
 
+@pytest.mark.slow
 def test_three_random_parameters() -> None:
     """Three of them, which take an expansion, with a deviation of a thousandth of what the mean differs by."""
 

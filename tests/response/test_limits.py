@@ -29,7 +29,13 @@ from shoal_validation.uncertain.reached import REPETITIONS
 from thrown import ALONG, THROWN, UP
 
 
-@pytest.mark.parametrize("state", ["a plane, 1e-7", "curved away", "two unequal design points", "four branches"])
+@pytest.mark.parametrize(
+    "state",
+    [
+        *("a plane, 1e-7", "four branches"),
+        *(pytest.param(name, marks=pytest.mark.slow) for name in ("curved away", "two unequal design points")),
+    ],
+)
 def test_probabilities_of_closed_forms(state: str) -> None:
     told = repeated(state, "auto", 20)
     assert told.held >= 0.9
@@ -37,7 +43,10 @@ def test_probabilities_of_closed_forms(state: str) -> None:
     assert told.within >= 0.9
 
 
-@pytest.mark.parametrize("state", ["a sphere, 1e-6, eight parameters", "two rods in line, 1e-6"])
+@pytest.mark.parametrize(
+    "state",
+    ["a sphere, 1e-6, eight parameters", pytest.param("two rods in line, 1e-6", marks=pytest.mark.slow)],
+)
 def test_limits_that_surround_the_mean(state: str) -> None:
     """Between any few design points lies most of the probability; it was left out, and nothing told."""
     told = repeated(state, "auto", 8)

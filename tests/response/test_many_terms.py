@@ -25,7 +25,8 @@ def box(parameters: int) -> Inputs:
     return Inputs(tuple(Parameter(f"x{k}", Interval(-1.0, 1.0), {f"x{k}": 1.0}) for k in range(parameters)))
 
 
-@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2, 3))])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(4))
 def test_waves_of_six_parameters_are_bounded_by_few_runs(seed: int) -> None:
     """exp(x0 / 4) cos(phase + shift): the phase goes all the way, of which a sum of degree four misses a hundredth."""
     shifts = np.linspace(0.0, 3.0, 7)

@@ -10,8 +10,8 @@ from shoal_validation.uncertain.moments import drawn, tried
     "seed",
     [
         pytest.param(21, id="cosine of a sum, curved between its runs"),
-        pytest.param(23, id="a wide lognormal variable"),
-        pytest.param(32, id="a kink that few runs pass"),
+        pytest.param(23, id="a wide lognormal variable", marks=pytest.mark.slow),
+        pytest.param(32, id="a kink that few runs pass", marks=pytest.mark.slow),
         pytest.param(48, id="three oscillators"),
         *(pytest.param(k, marks=pytest.mark.slow) for k in (16, 20, 36, 51, 58, 99, 103, 134)),
     ],

@@ -128,6 +128,7 @@ def test_a_run_that_another_integrator_can_make() -> None:
     assert answers.values[0, 0] == pytest.approx(found.y[0, -1], abs=1e-6)
 
 
+@pytest.mark.slow
 def test_the_worst_case_beyond_the_stable_step_can_be_run() -> None:
     ends = {"loads.stiff-spring.stiffness": (STIFF, 2 * STIFF), "loads.soft-spring.stiffness": (3.8, 4.2)}
     found = uncertain(springs(STEP), ends, [END], limits=["P.x < -0.06"])

@@ -105,6 +105,7 @@ def test_how_many_are_evaluated_at_once_changes_nothing_of_the_search(batch: int
         assert one.best_value == other.best_value
 
 
+@pytest.mark.slow
 def test_accuracy_is_limited_by_the_step() -> None:
     """Sphere in [-5, 5]^2, 40 fish, 100 iterations; medians of 20 seeds measured: 1.5e-4 and 1.9e-6."""
 

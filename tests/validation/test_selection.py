@@ -30,7 +30,7 @@ def test_a_machine_keeps_its_word_at_a_fair_price(seed: int) -> None:
     assert case.work <= 2.5 * case.least or case.rigid
 
 
-@pytest.mark.parametrize("seed", BENT)
+@pytest.mark.parametrize("seed", [*BENT[:2], pytest.param(BENT[2], marks=pytest.mark.slow)])
 def test_exudyn_on_a_fine_mesh_agrees_within_the_tolerance(seed: int) -> None:
     machine = draw(seed)
     chosen = select(machine.scene, machine.tolerance)
@@ -100,7 +100,7 @@ def test_every_tenth_machine_keeps_its_word() -> None:
     assert np.mean(np.array(ratios) <= 2) >= 0.9
 
 
-@pytest.mark.parametrize("seed", [9, 45])
+@pytest.mark.parametrize("seed", [pytest.param(9, marks=pytest.mark.slow), 45])
 def test_told_errors_cover_the_true_ones(seed: int) -> None:
     found = judge(seed)
     assert found is not None

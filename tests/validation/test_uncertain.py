@@ -81,6 +81,7 @@ def test_random_studies_keep_their_word(seed: int, runs: int) -> None:
     assert "1 random studies" in studies_text([found], runs)
 
 
+@pytest.mark.slow
 def test_what_is_asked_of_long_motions_is_reached() -> None:
     """The rows of pendulum, two frequencies and rod, and their table."""
     found = list(motions())

@@ -30,6 +30,7 @@ def test_the_tip_of_a_chain_is_where_other_engines_see_it(run: Any, tolerance: f
     np.testing.assert_allclose(run(6, steps, 1)[1], ours.point("tip")[0], atol=tolerance)
 
 
+@pytest.mark.slow
 def test_every_row_of_the_benchmark_is_measured() -> None:
     rows = list(measure((5,), repeats=1))
     assert len({row.name for row in rows}) == len(rows) == 6

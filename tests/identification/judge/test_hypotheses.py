@@ -242,6 +242,7 @@ def _plain(data: Any) -> Any:
     return float(data) if isinstance(data, np.floating) else data
 
 
+@pytest.mark.slow
 def test_a_right_model_fails_as_often_as_stated() -> None:
     """Noise with a memory, in two channels, and smooth effects of 40 hypotheses drawn at random."""
     rng, chances = np.random.default_rng(3), []
@@ -297,12 +298,12 @@ def check_right_models(kind: str, seeds: range, folder: Path) -> None:
         assert found.hypotheses
 
 
-@pytest.mark.parametrize("kind", ["pendulum", "torsion"])
+@pytest.mark.parametrize("kind", ["pendulum", pytest.param("torsion", marks=pytest.mark.slow)])
 def test_a_hidden_fault_is_named_or_the_model_is_rejected(kind: str, tmp_path: Path) -> None:
     check_faults(kind, range(10, 13), tmp_path)
 
 
-@pytest.mark.parametrize("kind", ["pendulum", "torsion"])
+@pytest.mark.parametrize("kind", ["pendulum", pytest.param("torsion", marks=pytest.mark.slow)])
 def test_right_models_are_kept(kind: str, tmp_path: Path) -> None:
     check_right_models(kind, range(100, 103), tmp_path)
 
@@ -347,7 +348,7 @@ def recorded(machine: Machine, times: Array, rng: np.random.Generator, **start: 
     return seen + machine.noise * rng.standard_normal(seen.shape)
 
 
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_a_short_hold_before_the_release_is_named(seed: int, tmp_path: Path) -> None:
     """The parameters follow all of it but a kink: the rate, which is sought, makes up for the delay."""
     rng = np.random.default_rng(seed)

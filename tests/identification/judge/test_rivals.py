@@ -196,7 +196,7 @@ def oscillator(folder: Path, frequency: float, lower: float, upper: float, start
     return Problem.parse(stated, "alias")
 
 
-@pytest.mark.parametrize("start", [9.0, 28.0])
+@pytest.mark.parametrize("start", [9.0, pytest.param(28.0, marks=pytest.mark.slow)])
 def test_a_stiffness_whose_frequency_the_samples_show_alike_is_ambiguous(start: float, tmp_path: Path) -> None:
     """cos(2 pi f t) is the same at multiples of 1 / 40 s for f = 10, 30 and 50 Hz."""
     found = identify(oscillator(tmp_path, 30.0, 5.0, 55.0, start, 0.0))

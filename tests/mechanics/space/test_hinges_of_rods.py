@@ -95,7 +95,7 @@ def test_a_shaft_that_friction_brakes_about_its_own_axis_runs_down(turned: bool)
 
 
 @pytest.mark.parametrize("first", ["ground", "rod"])
-@pytest.mark.parametrize("element", ["ancf-cable", "ancf-quintic"])
+@pytest.mark.parametrize("element", ["ancf-cable", pytest.param("ancf-quintic", marks=pytest.mark.slow)])
 def test_a_cable_with_friction_at_its_hinge_moves_as_in_the_plane(element: str, first: str) -> None:
     ground, cable = {"body": "ground", "point": [0.0, 0.0]}, {"body": "R"}
     sides = {"first": ground, "second": cable} if first == "ground" else {"first": cable, "second": ground}

@@ -289,18 +289,18 @@ def _number(x: Any) -> Any:
 
 
 def place_at(vector: Affine, q: Array) -> Array:
-    """A vector at coordinates, (d,) of (unknowns,) or (d, lanes) of (unknowns, lanes)."""
+    """Return a vector at coordinates, (d,) for (unknowns,) or (d, lanes) for (unknowns, lanes)."""
     return vector.at(q) if q.ndim == 1 else _summed(vector, vector.constant, q)
 
 
 def rate_at(vector: Affine, v: Array) -> Array:
-    """Its rate of change at rates of the coordinates, likewise."""
+    """Return the rate of change of a vector at rates of the coordinates, shaped likewise."""
     return vector.rate(v) if v.ndim == 1 else _summed(vector, 0.0 * vector.constant, v)
 
 
 def _summed(vector: Affine, constant: Array, q: Array) -> Array:
     total = sum((c * q[unknown] for unknown, c in vector.terms.items()), constant)
-    return np.broadcast_to(total, (len(total), q.shape[1]))
+    return np.broadcast_to(total, (len(total), max(total.shape[1], q.shape[1])))
 
 
 def changes(scene: Scene, used: Mapping[str, InitialState], size: Number, lanes: int = 1) -> list[dict[str, Any]]:
