@@ -14,7 +14,7 @@ from shoal.mechanics.numerics.tile import Array, Index, Tile
 class Applied(NamedTuple):
     """Applied loads of one tile; a function's number is -1 for the constant 1.
 
-    fixed: coefficient * function(t) on one row each (a force [N] on a point's row, or whatever is dual to the
+    fixed: coefficient * function(t) on one row each (a force [N] on a point's row, or the dual of another
     row); coefficient: (fixed, lanes). following: four rows each, those of the point and of the direction d that
     it turns with, and factor fx, fy [N], (2 * following, lanes): the force (fx + i fy) d/|d| * function(t). In space
     twelve rows, of the point and of the body's directors d, and three factors: the sum of f_k d_k. turning: in space,

@@ -115,7 +115,7 @@ def jacobian(tile: Tile, constraints: Constraints, z: Array, linear: float, out:
 
 @njit(cache=True, error_model="numpy")
 def pace(tile: Tile, constraints: Constraints, weights: Array, v: Array, lane: int) -> float:
-    """What the entries of weights' dC_q/dt add up to at a rate v of one lane where nothing cancels; weights: an array.
+    """Return the sum of the sizes of the entries of weights' dC_q/dt at a rate v of one lane; weights: an array.
 
     Velocities whose differences vanish, as those of a platform that does not turn, leave round-off of this size times
     eps, which says nothing.

@@ -34,7 +34,7 @@ class Work(NamedTuple):
     beginning of the step. stage: room of four states for integrators. element: room of 64 rows or more. memory: the
     continuous angle of every force element, (forces, lanes). power: dissipated minus supplied power
     [W], (lanes,). energy: kinetic, elastic, potential, elastic of the bodies alone [J], (4, lanes). until: the last
-    instant [s] before functions of time may jump, (1,); what is asked for later, is asked for then. rubbing: of
+    instant [s] before functions of time may jump, (1,); later times are replaced by it. rubbing: of
     friction by joint forces.
     """
 
@@ -193,7 +193,7 @@ def _solve(tile: Tile, m: Arrays, w: Work, a: Array) -> None:
 
 @njit(cache=True, error_model="numpy", inline="always")
 def constrain(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, tolerance: float, a: Array) -> None:
-    """`accelerate` where there are constraints, or somebody else who seeks the acceleration."""
+    """Accelerate with constraints, or where another method finds the acceleration; see `accelerate`."""
     if m.table.sought != 0:
         principle.state(tile, m, w.gauss, t, z, zdot)
         function_pointers.call_back(m.table.sought, t, a)

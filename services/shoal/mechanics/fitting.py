@@ -140,7 +140,7 @@ def _fit(
 def _stretches(
     function: Callable[[Any], Any], begin: float, horizon: float, knots: Sequence[float]
 ) -> tuple[list[_Stretch], Array]:
-    """Where a function is smooth, and where it is not."""
+    """Return the smooth stretches of a function, and the points between them."""
     if (node := getattr(function, "formula", None)) is not None:
         pieces = branches(node, begin, horizon)
         found = [
@@ -206,7 +206,7 @@ def _bisected(part: _Stretch, begin: float, horizon: float, scale: float, steep:
 
 
 def _bounds(node: formula.Node, lower: Array, upper: Array) -> tuple[Array, Array]:
-    """Of a smooth tree on each interval: how far its interpolation may be off, and how far its values are apart.
+    """Bound the interpolation error of a smooth tree on each interval, and the range of its values.
 
     Trefethen, theorem 7.1 and exercise 7.1: in n Chebyshev points the error is below |f^(n)|/n! / 2^(n - 1).
     """
@@ -226,7 +226,7 @@ def _too_fast(begin: float, horizon: float, where: Array) -> InputError:
 def _interpolated(
     function: Callable[[Any], Any], lower: Array, upper: Array
 ) -> tuple[Extended, Extended, Extended, Extended, Any]:
-    """Of each piece: Chebyshev series (pieces, ORDER - 1), its error, the largest value and its noise (pieces,).
+    """Interpolate each piece: Chebyshev series (pieces, ORDER - 1), its error, largest value and noise (pieces,).
 
     The last is the relative precision of the values.
     """
@@ -270,7 +270,7 @@ def fit_law(elastic: Function) -> Piecewise:
 
 
 def _innermost(elastic: Function) -> Piecewise:
-    """A force law at the smallest elongations at which it can be told from round-off."""
+    """Fit a force law at the smallest elongations at which it exceeds round-off."""
     for least in _DECADES[:-1]:
         with suppress(InputError):
             return fit(elastic, least, elastic.knots, begin=-least)
@@ -278,7 +278,7 @@ def _innermost(elastic: Function) -> Piecewise:
 
 
 def _outwards(elastic: Function, middle: Piecewise) -> list[Piecewise]:
-    """A force law from what is known of it about zero to where it ends, in order."""
+    """Fit a force law outwards, from its fit about zero to its end, in order."""
     parts, end = [middle], float(middle.breaks[-1])
     edges = [end, *_DECADES[end < _DECADES].tolist()]
     for side in (-1.0, 1.0):
@@ -300,7 +300,7 @@ def _outwards(elastic: Function, middle: Piecewise) -> list[Piecewise]:
 
 
 def _has_digits(law: Piecewise, elastic: Function, at: Array) -> bool:
-    """Return whether a law is met at these elongations to so many digits of its values there."""
+    """Return whether a fit has the required digits of a law at these elongations."""
     wanted = np.asarray(elastic(at.astype(np.longdouble)), dtype=float)
     found = np.array([value(law, float(x)) for x in at])
     return bool(np.all(np.abs(found - wanted) <= _DIGITS * np.abs(wanted)))

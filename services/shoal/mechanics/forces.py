@@ -58,7 +58,7 @@ def side(forces: Forces) -> int:
 
 @njit(cache=True, forceinline=True)
 def value_row(forces: Forces) -> int:
-    """Where `measure` leaves x; g' and the elastic force come after it."""
+    """Return the row of x of `measure`; g' and the elastic force follow it."""
     rows: int = 2 * side(forces)
     return rows
 
@@ -200,7 +200,7 @@ def _gradient(tile: Tile, forces: Forces, number: int, z: Array, w: Array) -> No
 
 @njit(cache=True, error_model="numpy")
 def measure(tile: Tile, forces: Forces, number: int, z: Array, memory: Array, w: Array) -> None:
-    """As `_gradient`, with x = g - g0 in place of g."""
+    """Compute `_gradient` with x = g - g0 in place of g."""
     width, d = len(tile), len(forces.space)
     _gradient(tile, forces, number, z, w)
     natural, row = (LAW * number + NATURAL) * width, value_row(forces) * width

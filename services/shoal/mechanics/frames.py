@@ -1,4 +1,4 @@
-"""How every kind of body hangs on the coordinates: any material point and direction as an affine vector."""
+"""Kinematics of every kind of body: any material point and direction as an affine vector of the coordinates."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class ModalFrame(RigidFrame):
     amplitudes: tuple[Affine, ...]
 
     def point(self, place: Place) -> Affine:
-        """The material point whose place in the undeformed body is told."""
+        """Return the material point with a place in the undeformed body."""
         return super().point(place) + self._sum(self.modes.shapes(place)[0])
 
     def direction(self, place: Place) -> Affine:
@@ -88,7 +88,7 @@ class ModalFrame(RigidFrame):
 
     @property
     def measured(self) -> list[tuple[Affine, Number]]:
-        """Of every mode a vector whose part along the frame is its amplitude but for a length [m]."""
+        """Return of every mode a vector whose part along the frame is its amplitude plus a length [m]."""
         length, along = self.modes.length, self.modes.along
         stretching = [one.turned(plane.QUARTER) for one in self.amplitudes[: max(along - 1, 0)]]
         even = [(self.directors[0] * length, length)] if along else []
@@ -106,7 +106,7 @@ class BeamFrame:
     """A flexible rod: the nodal vectors of its equally spaced nodes, and the element that interpolates them.
 
     nodes: one tuple of vectors per node (position first), as the element's file orders them. axes: of sections in
-    space, by node and axis, those further ones that joints hold as vectors; slope and director of the node tell them.
+    space, by node and axis, those further ones that joints hold as vectors; they follow from slope and director.
     """
 
     name: str

@@ -87,7 +87,7 @@ def evaluate(functions: Functions, number: int, t: float, derivative: int) -> fl
 
 @njit(cache=True, error_model="numpy")
 def excess(functions: Functions, number: int, t: float) -> float:
-    """How far t lies beyond the range of a function, with sign; 0 within it. Pointers (or arrays)."""
+    """Return the signed distance of t from the range of a function; 0 within it. Pointers (or arrays)."""
     if number < 0:
         return 0.0
     begin = functions.breaks[functions.start[number] + number]

@@ -1,4 +1,4 @@
-"""Where a march may not step across: times at which functions of time are not smooth, and narrow parts of force laws.
+"""Breakpoints of the time loop: times at which functions of time are not smooth, and narrow parts of force laws.
 
 A function is smooth between its jumps and kinks, where every step ends; but it may also be so narrow there (`narrow`)
 that a step would pass over it unseen.

@@ -1,7 +1,7 @@
 """Longer steps for leapfrog: more inertia for axial vibrations that are too fast for the step.
 
-Rods are stiff against stretching, and the step of an explicit integrator has to follow vibrations that hardly move the
-machine. With the stiffness S of all rods against stretching, the same in every direction, and S phi = w^2 M phi,
+Rods are stiff against stretching, and the step of an explicit integrator has to follow vibrations that move the
+machine little. With the stiffness S of all rods against stretching, the same in every direction, and S phi = w^2 M phi,
 
     M' = M + sum over w > c of (w^2/c^2 - 1) M phi phi' M,    c = 2 SHARE/h,
 

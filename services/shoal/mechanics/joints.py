@@ -189,7 +189,7 @@ class Geared(JointCondition):
 
     @property
     def factors(self) -> tuple[float, ...]:
-        """Of the angles, the largest of them 1."""
+        """Return the factors of the angles, the largest of them 1."""
         return tuple(count / self.most for count in self.teeth)
 
     @property

@@ -1,4 +1,4 @@
-"""A machine that is kept from run to run: what its scene alone tells is worked out once, its memory is used again."""
+"""A machine for repeated runs: what depends on the scene alone is computed once, and memory is reused."""
 
 from __future__ import annotations
 
@@ -78,9 +78,9 @@ class Machine:
         begin: float | None = None,
         whole: bool = False,
     ) -> Trajectory:
-        """The motion at `times` [s]; model: one that starts differently; begin: when the clock of the run was started.
+        """Return the motion at `times` [s]; model: one that starts differently; begin: start of the run by the clock.
 
-        whole: whether the trajectory tells its states.
+        whole: whether the trajectory holds its states.
 
         For threads and seek see `simulate`. Raises UnstableStepError if the step is beyond the stability limit.
         """
@@ -163,10 +163,10 @@ class Machine:
         return Still(self.model)
 
     def _parts(self, lanes: int) -> list[slice]:
-        """What is marched together: whole tiles, and what is left over in one more or, if that is faster, one by one.
+        """Split lanes into tiles: whole ones, and the rest in one more or, if that is faster, one by one.
 
-        Lanes that choose their steps stay together, so that those of neighbours are alike. How many threads there are
-        changes nothing.
+        Lanes of adaptive integrators stay together, so that neighbours take equal steps. The number of threads has no
+        influence.
         """
         _, parts = tiles(lanes)
         rest = lanes % len(WIDE)
@@ -187,7 +187,7 @@ class Machine:
         return explicit and self._alike and self.model.flexible > 0 and not self.model.constraints.size
 
     def _workspaces(self, times: Array, tile: Tile, spare: int, whole: bool) -> tuple[Halts, list[Workspace]]:
-        """Where the steps of a run end, and the workspaces for it that are idle."""
+        """Return the breakpoints of a run, and idle workspaces for it."""
         key = times.tobytes(), len(tile), spare, whole
         found = self._idle.get(key)
         if found is None:
@@ -198,7 +198,7 @@ class Machine:
         return found
 
     def _facts(self, begun: Array | None) -> dict[str, Any]:
-        """What is computed, for the record; begun: coordinates and rates at the start, of a scene without lanes."""
+        """Return the record of the computation; begun: coordinates and rates at the start, of a scene without lanes."""
         scene, model, choice = self.scene, self.model, self.choice
         return {
             "unknowns": model.unknowns,
@@ -234,7 +234,7 @@ class Machine:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Changes(Sequence[Mapping[str, Any]]):
-    """What every lane of a model uses in place of what is stated, as `start.changes` tells it; worked out when asked.
+    """Values that lanes of a model use in place of stated ones (`start.changes`), computed on demand.
 
     A lane that has no start changes nothing.
     """

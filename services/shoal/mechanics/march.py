@@ -230,7 +230,7 @@ def _advance(
 ) -> float:
     """One step of at most `rest` [s], shorter where it would leap over a part of a force law; returns its length.
 
-    keep: whether somebody will ask for the motion inside it.
+    keep: whether the motion inside it will be needed.
     """
     end = m.unknowns * len(tile)
     watched = halts.marks.size > 0

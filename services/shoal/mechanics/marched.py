@@ -1,4 +1,4 @@
-"""What a march works on and what it leaves behind."""
+"""Data of the time loop: its input (`Frame`), its state and its record."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ TURN = 2.0 * np.pi
 
 
 class Marched(NamedTuple):
-    """What a march leaves behind. samples: (times * markers * sampled(d), lanes), see `sampled`; the rest: (lanes,).
+    """Record of the time loop. samples: (times * markers * sampled(d), lanes), see `sampled`; the rest: (lanes,).
 
     energy_error: largest |E + dissipated - E(0)| [J]; energy_scale: largest energy in motion [J], kinetic, of
     bent bodies and the size of that of springs; drift: largest violation of a constraint by its power of a length,
@@ -40,7 +40,7 @@ class Marched(NamedTuple):
 
 
 class LoopRoom(NamedTuple):
-    """What the loop keeps between steps.
+    """State of the loop between steps.
 
     past: coordinates, rates and accelerations at the beginning of the step, (3 * unknowns, lanes). q, v: the motion
     inside it, (rows, lanes). turns [rad], above: whole turns of every marker's direction, and on which side of the x
@@ -107,7 +107,7 @@ def rooms(tile: Tile, arrays: Arrays, times: int, marker_rows: Index) -> tuple[M
 
 
 class Frame(NamedTuple):
-    """All that the march of one tile works on.
+    """Input of the time loop for one tile.
 
     step: [s], of schemes of fixed step, which take `steps` of them; adaptive ones end at the last of the times and take
     at most so many. times: at which the marker rows are sampled [s], increasing, `samples` of them; directed: number of
@@ -156,7 +156,7 @@ def framed(
 
 
 def loop_of(frame: Frame) -> tuple[Any, ...]:
-    """What the type of a frame depends on: frames that agree in it share a compiled loop."""
+    """Return the key of a frame's type: frames with equal keys share a compiled loop."""
     return len(frame.tile), len(frame.arrays.space), type(frame.scheme), *map(type, frame.arrays.elements)
 
 
@@ -185,7 +185,7 @@ def told(
     motion: Array,
     numbers: Array,
 ) -> None:
-    """What the record of a tile of some width says of its lanes, the first of which is lane `first` of all.
+    """Reduce the record of a tile of a width to results of its lanes, the first of which is lane `first` of all.
 
     turns: of the stated directions of the markers [rad], (markers, lanes) or (markers, 1). anchors: on the ground,
     (anchors, d, lanes) or (anchors, d, 1). floor: no energy error is compared with less [J]; span: the machine's size

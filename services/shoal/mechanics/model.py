@@ -52,8 +52,8 @@ class FunctionTable(NamedTuple):
 class Arrays(NamedTuple):
     """All a kernel needs of one tile of lanes. space: a tuple as long as vectors are.
 
-    method, baumgarte: how accelerations are found. mass_factor, mass_root: of the mass matrix with what flat bodies are
-    lent, which is in `lent`, empty where nothing is; refinements: how often that is taken back, see `least.lent`.
+    method, baumgarte: how accelerations are found. mass_factor, mass_root: of the regularised mass matrix; lent: the
+    mass added to flat bodies, empty where none is; refinements: iterations that compensate it, see `least.lent`.
     elements: one structure a family. alike: the mass matrix where all lanes have the same one.
     """
 
@@ -100,9 +100,9 @@ class Model:
     (rows, lanes) or (rows, 1). start_angles: relative angles at the start that angle forces count
     their turns from [rad], (forces, lanes) or (forces, 1). kinks: of every function, where it or a derivative jumps.
     owners: for each family of elements the body of every element. failed: lanes whose start contradicts the joints,
-    (lanes,) or (1,). frames: how bodies hang on the coordinates. mass_entries, lent_entries, stretching_entries: the
-    lower triangles of the mass matrix, of what thin bodies are lent, and of the rods' stiffness against stretching, see
-    `Element`; the latter is empty where nobody wants it. flat: whether accelerations need what is lent. stated: the
+    (lanes,) or (1,). frames: kinematics of the bodies. mass_entries, lent_entries, stretching_entries: the lower
+    triangles of the mass matrix, of the mass added to thin bodies, and of the rods' stiffness against stretching, see
+    `Element`; the last is empty where it is not needed. flat: whether accelerations need the added mass. stated: the
     scene as it was given, in whose order the coordinates are numbered; scene: with the start that agrees with its
     joints. slowed: axial modes whose inertia is raised, see `inertia_cap`.
     """
@@ -182,13 +182,13 @@ class Model:
 
     @cached_property
     def metric_entries(self) -> dict[tuple[int, int], Array]:
-        """The lower triangle of the mass matrix with what thin bodies are lent."""
+        """Return the lower triangle of the regularised mass matrix."""
         lent = self.lent_entries
         return self.mass_entries | {key: self.mass_entries.get(key, 0.0) + more for key, more in lent.items()}
 
     @property
     def _factored(self) -> dict[tuple[int, int], Array]:
-        """What accelerations are found with."""
+        """Return the matrix that is factored for accelerations."""
         return self.metric_entries if self.flat else self.mass_entries
 
     @cached_property
@@ -230,7 +230,7 @@ class Model:
 
     @cached_property
     def _alike(self) -> Alike:
-        """What solves for the accelerations of all lanes, where they have the same mass matrix."""
+        """Return the solver of all lanes, where they have the same mass matrix."""
         if self.mass_values.shape[1] > 1:
             return Alike(0, _EMPTY, np.zeros(0), paired(_EMPTY, np.zeros(0)), np.zeros(0))
         components, entries = alike.analyse(self.unknowns, self.dimensions, self.mass_entries)
@@ -243,7 +243,7 @@ class Model:
         return Alike(components, pattern, matrix, paired(pattern, factor), alike.spread_inverse(dense, components))
 
     def _singular(self, weightless: set[int]) -> InputError:
-        """What to state where these unknowns move no mass."""
+        """Return the error for unknowns without mass."""
         bodies = [name for name, frame in self.frames.items() if any(weightless & {*v.terms} for v in frame.vectors)]
         dry = [name for name, joint in self.scene.joints.items()
                if np.any(getattr(joint, "mu", 0.0)) and any(side.body in bodies for side in places(joint))]  # fmt: skip

@@ -1,4 +1,4 @@
-"""What `integrator: auto` does where its first choice fails: it takes another, from the cheapest on.
+"""Fallback integrators of `integrator: auto` where the first choice fails, from the cheapest on.
 
 The first choice follows from the start alone: a rod that is stretched, turns fast or closes a loop may ask for more.
 Lanes of one call keep their common first choice, so that differences between them are differences of the motion.

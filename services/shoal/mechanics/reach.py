@@ -1,4 +1,4 @@
-"""How far a machine can reach: no point is farther from its anchor than all bodies stretched out in a line.
+"""Bound of the reach of a machine: no point is farther from its anchor than all bodies stretched out in a line.
 
 A flexible rod stretches. Its strain energy is at least E A L e^2 / 2 for the mean strain e of its axis, as the mean of
 squares is not below the square of the mean (for the Green strain of ancf-full, which is not below e, even more). So the
@@ -112,7 +112,7 @@ def tethered(scene: Scene) -> bool:
 
 
 def _tethers(scene: Scene) -> list[Meet]:
-    """Where joints hold places together."""
+    """Return the conditions of joints that connect points."""
     return [condition for _, condition in of_scene(scene) if isinstance(condition, Meet)]
 
 

@@ -114,7 +114,7 @@ def load(tile: Tile, r: Rubbing, unknowns: int, rows: int, multiplier: Array, ou
 
 @njit(cache=True, error_model="numpy")
 def _change(tile: Tile, r: Rubbing, lane: int, rows: int, multiplier: Array, out: Array) -> float:
-    """How far the joints' forces in a lane are from those that the friction was loaded with, over the largest."""
+    """Return the relative change of the joints' forces in a lane since the friction was computed."""
     end = (r.size + 1) * rows
     most, largest = 0.0, 0.0
     for k in range(r.size):

@@ -1,8 +1,8 @@
-"""Least constraint as one sparse saddle point problem: linear cost, and the least where no position is singular.
+"""Least constraint as one sparse saddle point problem, of linear cost, for regular positions.
 
 [M C_q'; C_q 0] [a; lambda] = [Q; -eta] is factored as L D L' in an order of least fill in which every multiplier
-comes after its coordinates. The pivot of a multiplier is then minus the square of what is left of its row, in the
-mass metric, when the rows before it are taken out; one that vanishes against its first value marks a row that
+comes after its coordinates. The pivot of a multiplier is then minus the square of the remainder of its row, in the
+mass metric, after elimination of the rows before it; one that vanishes against its first value marks a row that
 depends on the others. Its distance from singular enters squared. So machines with few constraints take the orthogonal
 projection near singular positions; with many, the row is left out, and a position counts as singular earlier than
 with the projection. Implicit steps solve [H C_q'; C_q 0] in the same way, with the
@@ -174,7 +174,7 @@ def eliminate(
 
 @njit(error_model="numpy", forceinline=True)
 def _by_coordinates(tile: Tile, p: sparse.Pattern, multiplier: Index, values: Array, k: int) -> Any:
-    """What its coordinates take off the pivot of a multiplier; its row is not finished yet."""
+    """Return the part of the pivot of a multiplier that its coordinates eliminate; its row is not finished yet."""
     taken = simd.spread(tile, 0.0)
     for e in range(p.across[k], p.across[k + 1] if multiplier[k] else p.across[k]):
         if not multiplier[p.other[e]]:

@@ -28,7 +28,7 @@ STEP_MARGIN = 0.95
 
 
 def machine(scene: Scene, end: float) -> Machine:
-    """What is kept of a scene for runs up to `end` [s]. Raises InputError if it cannot be modelled."""
+    """Return the cached machine of a scene for runs up to `end` [s]. Raises InputError if it cannot be modelled."""
     return _machine(scene.model_dump_json(), max(end, scene.solver.duration), end > 0)
 
 
@@ -42,11 +42,11 @@ def simulate(
     machine: Callable[[Scene, float], Machine] = machine,
     whole: bool = False,
 ) -> Trajectory:
-    """Motion of a scene, or of one scene per lane, sampled at `times` [s].
+    """Simulate a scene, or one scene per lane, sampled at `times` [s].
 
-    values: path in the scene -> one number per lane. Lanes are computed in tiles, tiles on threads. seek: who seeks the
-    accelerations of a single lane in place of Gauss's principle as it is solved here. machine: who keeps the scene.
-    whole: whether the trajectory tells its states.
+    values: path in the scene -> one number per lane. Lanes are computed in tiles, tiles on threads. seek: finds the
+    accelerations of a single lane in place of the native solution of Gauss's principle. machine: returns the cached
+    machine of the scene. whole: whether the trajectory holds its states.
     Raises InputError if the scene cannot be modelled or its step is beyond the stability limit.
     """
     begin, end = clock.now(), float(times[-1])
@@ -89,7 +89,7 @@ _PACE = (
 
 
 def _key(scene: Scene, end: float) -> tuple[str, float]:
-    """What a model is built from: the scene, and up to where its functions of time are wanted [s]."""
+    """Return the key of a model: the scene, and the end of its functions of time [s]."""
     kept = ("step", "integrator") if scene.solver.caps_inertia else ()
     usual = {name: Solver.model_fields[name].default for name in _PACE if name not in kept}
     neutral = scene.model_copy(update={"solver": scene.solver.model_copy(update=usual)})

@@ -12,7 +12,7 @@ from shoal.mechanics.numerics.tile import Array, Index
 
 
 class States(NamedTuple):
-    """Of the lanes of a model at sampled times: coordinates and their rates, (samples, unknowns, lanes) each."""
+    """States of the lanes of a model at sampled times: coordinates and rates, (samples, unknowns, lanes) each."""
 
     model: Model
     q: Array
@@ -25,7 +25,7 @@ class States(NamedTuple):
 
 
 def rows(model: Model) -> Index:
-    """The rows of points, and of directions which nobody looks at, that hold all coordinates: flat, as a march does."""
+    """Return rows of points, and of unused directions, that hold all coordinates: flat, as in the time loop."""
     d = model.dimensions
     own = np.minimum(np.arange(_count(model) * d), model.unknowns - 1).reshape(-1, d)
     return np.concatenate([own, own], axis=1).ravel().astype(model.marker_rows.dtype)
@@ -44,5 +44,5 @@ def split(record: Marched, states: States, width: int, part: slice) -> Marched:
 
 
 def _count(model: Model) -> int:
-    """How many points hold all coordinates."""
+    """Return the number of points that hold all coordinates."""
     return -(-model.unknowns // model.dimensions)

@@ -35,8 +35,8 @@ class Held(NamedTuple):
 class Tangent(NamedTuple):
     """Pattern of H = c_M M + c_D D + K and the lists that assemble it, for one tile.
 
-    mass: M with what thin bodies are lent: iterations converge all the same, and a body that is all but flat does not
-    limit the stable step.
+    mass: the regularised M: iterations converge all the same, and a nearly flat body does not limit the stable
+    step.
     `block` holds the square tangents of all elements, family by family, then those of the force elements: `blocks`
     rows. Its row source[s] adds to slot s, where none does, a row of zeros behind two such blocks; row more[k] adds to
     slot also[k], too. Share k adds part[k] * block[shared[k]] to slot[k], for elements whose rows are sums of
@@ -257,7 +257,7 @@ def _assembled(tile: Tile, t: Tangent, block: Array) -> Array:
 
 @njit(cache=True, error_model="numpy")
 def _of_family(tile: Tile, address: int, family: Any, z: Array, w: Array, block: Array, first: int) -> None:
-    """What the kernel at an address, for the stiffness or the damping, finds of a family."""
+    """Run the kernel at an address, for the stiffness or the damping of a family."""
     function_pointers.call(address, (tile, raw(family), pointer(z), pointer(w), pointer(block), first))
 
 

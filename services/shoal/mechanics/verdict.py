@@ -1,4 +1,4 @@
-"""Whether a run of the native solver can be believed: finite, within reach, its energy balanced, its joints closed."""
+"""Checks of a run of the native solver: finite, within reach, energy balanced, joints closed."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ _JUDGED = slice(FARTHEST, CONSTRAINT_DRIFT + 1)
 
 
 class Limits:
-    """What the runs of a scene must keep to, as far as the scene tells it; worked out once for all of them.
+    """Limits of the checks of a scene's runs, computed once.
 
-    numbers, here and below: what `marched.told` says of every lane, (NUMBERS, lanes).
+    numbers, here and below: results of `marched.told` for every lane, (NUMBERS, lanes).
     """
 
     def __init__(self, scene: Scene, model: Model) -> None:
@@ -60,7 +60,7 @@ class Limits:
         self._fine = np.concatenate([near[None], np.broadcast_to(tolerances, (2, len(near)))])
 
     def _reach(self, energy: Array) -> Array:
-        """How far a marker may be away [m]; a wheel's centre, which moves nowhere, as far as round-off goes."""
+        """Return the largest distance of a marker [m]; round-off for a wheel's centre, which does not move."""
         return reaches.MARGIN * reaches.reach(self._model.scene, energy) + ROUND_OFF * self.span
 
     def _sprung(self) -> float:

@@ -54,10 +54,10 @@ class Kernel(NamedTuple):
 
 
 def warm(integrators: Iterable[str] = tuple(INTEGRATORS), note: Note = lambda _: None, *, every: bool = True) -> float:
-    """Compile what is not yet in the cache, on all cores, and load it; returns the seconds it took.
+    """Compile kernels that the cache lacks, on all cores, and load them; return the time [s].
 
     every: for any scene, with constraints and all families of elements; else for cables that hang together. The first
-    integrator comes with the kernels of the mechanics, which the others share. `note` is told what is being done.
+    integrator comes with the kernels of the mechanics, which the others share. `note` takes lines of progress.
     """
     begin = time.perf_counter()
     first, *others = integrators

@@ -1,1 +1,1 @@
-"""What is asked of a machine besides its motion: equilibrium, modes, reactions, section forces."""
+"""Analyses besides the motion: equilibrium, modes, reactions, section forces."""

@@ -1,11 +1,10 @@
-"""Where the forces of a model at rest balance: Newton's method and descent of the potential, on the constraints.
+"""Static equilibrium of a model: Newton's method and descent of the potential, on the constraints.
 
 Both work in a basis Z of the free directions with Z' M Z = I, so that lengths are in kg^1/2 m and the eigenvalues of
 the reduced stiffness Z' (K + sum lambda_k C_k,qq) Z are squared frequencies. Descent replaces them by their absolute
 values, so that it leaves saddles and maxima (Dauphin et al. 2014), and shortens its step as Levenberg and Marquardt do.
-Loads that follow the motion have no potential: with them the machine creeps, as if damped so strongly that inertia
-counts for nothing, by implicit steps that grow as it comes to rest (pseudo-transient continuation, Kelley and Keyes
-1998).
+Loads that follow the motion have no potential: with them the machine creeps, as if overdamped, by implicit steps that
+grow as it comes to rest (pseudo-transient continuation, Kelley and Keyes 1998).
 """
 
 from __future__ import annotations
@@ -62,7 +61,7 @@ class View(NamedTuple):
 
 
 class Found(NamedTuple):
-    """Where an iteration ended. correction: its last, relative to the machine's size."""
+    """Result of an iteration. correction: its last, relative to the machine's size."""
 
     q: Array
     converged: bool
@@ -117,7 +116,7 @@ class Balance:
         return Tangent(full, ROUND * (abs(loose) + abs(full - loose)))
 
     def at_rest(self, q: Array, view: View) -> Tangent:
-        """The same; where the forces balance, what is left of them is round-off that displacements turn."""
+        """Return the tangent at an equilibrium, where the remaining forces are round-off."""
         found, evaluation = self.tangent(q, view), view.evaluation
         if self.residual(view) > BALANCED:
             return found
@@ -129,7 +128,7 @@ class Balance:
         return self.spectrum_of(self.tangent(q, view, load), view)
 
     def spectrum_of(self, stiffness: Tangent, view: View) -> Spectrum:
-        """That of a symmetric stiffness."""
+        """Return the spectrum of a symmetric stiffness."""
         parts = parts_of(self.evaluator.mass, view.evaluation.jacobian)
         return spectrum(stiffness, view.freedom.basis, self.evaluator.mass, parts)
 
@@ -147,7 +146,7 @@ class Balance:
         return max(self._least, *(self.metric.size(part) for part in parts))
 
     def restore(self, q: Array) -> tuple[Array, float]:
-        """The nearest place (metric of M) where the joints close, and how far they still gape."""
+        """Return the nearest position (metric of M) that satisfies the joints, and the remaining violation."""
         if self.evaluator.model.constraints.size == 0:
             return q, 0.0
         gap = np.inf
@@ -266,7 +265,7 @@ class Balance:
         return Found(q, False, most, correction, f"not at rest after {most} steps")
 
     def _way(self, move: Array) -> float:
-        """How far a move goes [kg^1/2 m]; among its components are curvatures, which may be large."""
+        """Return the length of a move [kg^1/2 m]; its components include curvatures, which may be large."""
         return float(np.sqrt(max(0.0, float(move @ (self.evaluator.mass @ move)))))
 
     def _relax(self, q: Array, stiff: float) -> tuple[Array, float]:

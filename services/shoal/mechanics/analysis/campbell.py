@@ -52,7 +52,7 @@ class Campbell:
 
     @property
     def message(self) -> str:
-        """Why there are no modes, or at which speeds a motion grows."""
+        """Return why there are no modes, or the speeds at which a motion is unstable."""
         grows = [
             f"{speed:g}"
             for speed, found in zip(self.speeds, self.modes, strict=True)

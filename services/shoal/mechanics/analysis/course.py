@@ -1,4 +1,4 @@
-"""The motion of a rigid machine in the plane as any engine tells it, and the coordinates that follow from it."""
+"""Motion of a planar rigid machine from any engine, and the native coordinates that follow from it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _STEP = 1e-6
 
 @dataclass(frozen=True)
 class Course:
-    """How the bodies of a scene move, in its order, at increasing times [s], of which the first is the start.
+    """Motion of the bodies of a scene, in its order, at increasing times [s], of which the first is the start.
 
     places [m]: of the origins of their frames, (samples, bodies, 2, lanes), and velocities [m/s]; angles [rad],
     continuous, (samples, bodies, lanes), and rates [rad/s]
@@ -58,12 +58,12 @@ class _Rigid:
         self.v = np.concatenate([self._stacked(velocities, turning), driven_rates], axis=1) @ self._inverse.T
 
     def _coordinates(self, places: Array, angles: Array, driven: Array) -> Array:
-        """Of poses of the bodies and places of moving points, (samples, unknowns)."""
+        """Return the coordinates of poses of the bodies and positions of moving points, (samples, unknowns)."""
         here = np.concatenate([self._stacked(places, _direction(angles)), driven], axis=1)
         return np.asarray((here - self._constant.ravel()) @ self._inverse.T)
 
     def _stacked(self, origins: Array, directors: Array) -> Array:
-        """What is known of the vectors of all frames, (samples, 2 vectors)."""
+        """Stack the known vectors of all frames, (samples, 2 vectors)."""
         parts = list[Array]()
         for k, frame in enumerate(self._frames):
             parts += [origins[:, k], directors[:, k]] if isinstance(frame, RigidFrame) else [origins[:, k]]

@@ -39,7 +39,7 @@ class Roots(NamedTuple):
 
     @property
     def grows(self) -> npt.NDArray[np.bool_]:
-        """Which motions grow."""
+        """Return which modes are unstable."""
         return self.values.real > REAL * np.abs(self.values)
 
     def ordered(self) -> Roots:

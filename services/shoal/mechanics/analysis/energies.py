@@ -16,7 +16,7 @@ from shoal.scene import RigidBody, Rod
 
 
 class Energies(NamedTuple):
-    """Of the bodies, of springs, and of weights above the origin of the ground [J], (samples,) each."""
+    """Energies of bodies, of springs, and of weights above the origin of the ground [J], (samples,) each."""
 
     kinetic: Array
     elastic: Array
@@ -24,7 +24,7 @@ class Energies(NamedTuple):
 
     @property
     def potential(self) -> Array:
-        """That of springs and weights; loads have none here, they do work."""
+        """Return the potential energy of springs and weights; loads do work instead."""
         return self.elastic + self.gravity
 
     @property
@@ -34,7 +34,7 @@ class Energies(NamedTuple):
 
 
 def energies_along(felt: Felt) -> Energies:
-    """Of one lane; of a model that bends or moves in space its only one."""
+    """Return the energies of one lane; of a model that bends or moves in space its only one."""
     model = felt.evaluator.model
     if model.dimensions != plane.DIMENSIONS or model.flexible or model.modal:
         return _of_bodies(felt)
@@ -61,7 +61,7 @@ def _of_rigid(felt: Felt) -> Energies:
     model, kinetic, gravity = felt.evaluator.model, np.zeros(len(felt.times)), np.zeros(len(felt.times))
 
     def number(stated: Any) -> float:
-        """Of this lane."""
+        """Return a stated number for this lane."""
         return float(np.ravel(stated)[felt.lane % np.size(stated)])
 
     for name, frame in model.frames.items():

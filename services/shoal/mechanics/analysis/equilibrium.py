@@ -17,7 +17,7 @@ from shoal.trajectory import plain
 
 
 class Held(StrEnum):
-    """How the search for an equilibrium ended. Only `ok` may be believed."""
+    """Status of a search for an equilibrium. Only `ok` is accepted."""
 
     OK = "ok"
     UNSTABLE = "unstable"

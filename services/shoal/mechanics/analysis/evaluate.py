@@ -70,7 +70,7 @@ class Points(NamedTuple):
         return self.matrix @ q + self.constant
 
     def turning(self, q: Array) -> Array:
-        """Of directions: the derivatives of their angles [rad] at q, about z, (vectors, unknowns)."""
+        """Return the derivatives of the angles [rad] of directions at q, about z, (vectors, unknowns)."""
         now = self.at(q)[:, :2]
         x, y = self.matrix.transpose(1, 0, 2)[:2]
         return np.asarray(plane.cross(now.T[..., None], (x, y)) / np.sum(now**2, axis=1)[:, None])
@@ -91,7 +91,7 @@ def points(vectors: Sequence[Affine], unknowns: int, lane: int = 0) -> Points:
 class Evaluator:
     """Evaluates a model at any state; not for threads, as it keeps the turns that angle forces counted.
 
-    lane: which of the model's; forces and accelerations are told in any, all else in the first
+    lane: of the model; forces and accelerations are available in any lane, all else in the first
     """
 
     def __init__(self, model: Model, lane: int = 0) -> None:

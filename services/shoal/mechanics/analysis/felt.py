@@ -1,4 +1,4 @@
-"""What sensors on a machine feel along its motion: Gauss's principle tells the accelerations of all coordinates."""
+"""Virtual sensors along a motion; accelerations of all coordinates follow from Gauss's principle."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Felt:
     """One lane of a machine along its motion.
 
     evaluator: of a model one of whose lanes it is; times [s]: of the samples, the first is the start; q, v: coordinates
-    and rates, (samples, unknowns); way: tells poses from the start on, see `Evaluator.along`; lane: of the model
+    and rates, (samples, unknowns); way: returns poses from the start on, see `Evaluator.along`; lane: of the model
     """
 
     def __init__(
@@ -90,9 +90,9 @@ class Felt:
         return np.asarray(np.stack(own, axis=1) @ _sensor(tilt).T)
 
     def strain(self, at: Attachment, height: float, side: float) -> Array:
-        """Of a straight rod along its axis, at a height (local y) and to a side (z) of it [m], (samples,).
+        """Return the axial strain of a straight rod at a height (local y) and side (z) of its section [m], (samples,).
 
-        In space of director rods.
+        In space for director rods.
         """
         name, place = place_of(self.scene, at)
         frame = self._frame(name)
@@ -163,7 +163,7 @@ def _joined(evaluator: Evaluator, times: Array, q: Array, v: Array, lane: int) -
 
 
 def _directions(evaluator: Evaluator) -> list[Affine]:
-    """Of all bodies, of flexible ones at every node."""
+    """Return the directions of all bodies, of flexible ones at every node."""
     found = list[Affine]()
     for frame in evaluator.model.frames.values():
         if isinstance(frame, BeamFrame):

@@ -111,7 +111,7 @@ def _without_joints_in_space(scene: Scene, placement: Placement) -> Scene:
 
 
 def _with_inertia(scene: Scene) -> tuple[Scene, dict[str, float]]:
-    """A body without inertia about its centre can move as a part of a machine but not alone: it is lent 1 kg m^2."""
+    """Add 1 kg m^2 to bodies without inertia about their centre, which cannot move alone."""
     lent = {name: 1.0 for name, body in scene.bodies.items() if isinstance(body, RigidBody) and body.inertia == 0.0}
     bodies = {
         name: body.model_copy(update={"inertia": lent[name]}) if name in lent else body

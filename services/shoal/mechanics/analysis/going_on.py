@@ -117,7 +117,7 @@ def _coordinates(model: Model, state: End, vectors: list[tuple[str, Affine]], la
 
 
 def _turn_axes(model: Model, q: Array, v: Array, lane: int) -> None:
-    """Turn the further axes of sections, which no body has, as slopes and directors tell."""
+    """Turn the further axes of sections, which no body has, by slopes and directors."""
     for frame in (one for one in model.frames.values() if isinstance(one, BeamFrame)):
         for (node, number), vector in frame.axes.items():
             place = (node * frame.element_length, 0.0, 0.0)
@@ -134,7 +134,7 @@ def _entries(vectors: list[tuple[str, Affine]], d: int, lane: int) -> Iterator[t
 
 
 def _scales(model: Model, rates: Array) -> tuple[float, float]:
-    """What a gap and a rate are compared with; directors have the length one."""
+    """Return the scales of a gap and of a rate; directors have the length one."""
     size = min(1.0, span(model.stated))
     return size, max(float(np.max(np.abs(rates), initial=0.0)), size / max(model.stated.solver.duration, 1.0))
 

@@ -84,7 +84,7 @@ def _attachments(part: Any) -> Iterator[Attachment]:
 
 
 def _directors(placement: Placement, axes: dict[str, tuple[Array, Array]]) -> Iterator[tuple[str, list[Affine]]]:
-    """What may spin, and the directors that tell it."""
+    """Yield what may spin, and the directors that define its rotation."""
     for name, frame in placement.frames.items():
         if isinstance(frame, BeamFrame) and frame.element.director is not None:
             yield name, [*(node[2] for node in frame.nodes), *frame.axes.values()]

@@ -35,7 +35,7 @@ BALANCED = 1e-6
 
 @dataclass(frozen=True)
 class JointReaction:
-    """What a joint exerts on its second body (on its first: the opposite).
+    """Reaction of a joint on its second body (on its first: the opposite).
 
     at: where [m]; force [N] and torque [N m] (counter-clockwise, in space a vector), friction included; components:
     each unknown of the joint by name (fx, fy, torque, normal, axial, coupled, ...) with its value; unique: whether none

@@ -1,4 +1,4 @@
-"""What the balance of a machine at rest leaves out: dry friction, at which it may stick, and motion."""
+"""Effects that static equilibrium neglects: dry friction, in which the machine may stick, and moving drives."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ STILL = 1e-9
 
 
 def friction(scene: Scene, reactions: Reactions | None) -> str:
-    """Which joints have dry friction, and by how much each may be off for it [N or N m]; empty where none has."""
+    """Return which joints have dry friction, and the error of each reaction [N or N m]; empty where none has."""
     told = []
     for name, joint in scene.joints.items():
         if not (isinstance(joint, Revolute | Slider) and joint.dry):
@@ -35,6 +35,6 @@ def driving(evaluator: Evaluator, q: Array, t: float) -> list[str]:
 
 
 def driven(evaluator: Evaluator, q: Array, t: float) -> str:
-    """Which drives move at time t [s], as a remark; empty where none does."""
+    """Return a remark on drives that move at time t [s]; empty where none does."""
     names = driving(evaluator, q, t)
     return f"the motion of {', '.join(names)} at t = {t:g} s is left out" if names else ""

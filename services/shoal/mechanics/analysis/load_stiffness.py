@@ -17,7 +17,7 @@ Strengths = Callable[[Index], Array]
 
 
 def in_plane(arrays: Arrays, z: Array, strengths: Strengths) -> Blocks:
-    """Of forces that follow."""
+    """Return the stiffness of follower forces."""
     applied, blocks = arrays.applied, []
     strength = strengths(applied.following_function)
     for k in range(applied.following):
@@ -32,7 +32,7 @@ def in_plane(arrays: Arrays, z: Array, strengths: Strengths) -> Blocks:
 
 
 def in_space(arrays: Arrays, z: Array, strengths: Strengths) -> Blocks:
-    """Of forces that follow, and of torques on rigid bodies and on nodes of rods, as `applied` states them."""
+    """Return the stiffness of follower forces, and of torques on rigid bodies and nodes of rods, see `applied`."""
     applied = arrays.applied
     blocks: Blocks = []
     strength = strengths(applied.following_function)
@@ -66,7 +66,7 @@ def in_space(arrays: Arrays, z: Array, strengths: Strengths) -> Blocks:
 
 
 def driven(arrays: Arrays, z: Array, number: int, last: float) -> float:
-    """What a drive acts along: the distance, the angle nearest to the last one, or the place of a force element."""
+    """Return the coordinate of a drive: the distance, the angle nearest to the last one, or that of a force element."""
     kind, (a, b, d) = _measured(arrays, z, number)
     if kind == forces.DISTANCE:
         return float(np.linalg.norm(b - a))
@@ -77,7 +77,7 @@ def driven(arrays: Arrays, z: Array, number: int, last: float) -> float:
 
 
 def of_drives(arrays: Arrays, z: Array, drives: list[tuple[int, float]]) -> Blocks:
-    """Of drives: (force element, force [N] or torque [N m]) times the second derivatives of what it acts along."""
+    """Return the stiffness of drives: forces [N] or torques [N m] times second derivatives of their coordinates."""
     blocks: Blocks = []
     for number, size in drives:
         kind, (a, b, d) = _measured(arrays, z, number)

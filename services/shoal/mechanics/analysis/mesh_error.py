@@ -1,10 +1,9 @@
-"""How far what is computed of a machine is off for its mesh: by the same once more, on twice as many elements of all.
+"""Mesh error by Richardson extrapolation: the same computation on twice as many elements of all bodies.
 
-Two meshes differ by less than the coarser one is off, as the finer one is off, too: by d / (f - 1), where d is how far
-they differ and f the factor by which that falls with each doubling. No factor above that of second order is believed,
-though cables and quintic elements converge faster: an error is rather told too large than too small. Nor is a distance
-that fell by more: an error of second order and a faster one of the other sign, such as a tapered cable has, cancel on
-some mesh, and the distance is small there by chance.
+The error of the finer of two meshes is d / (f - 1), with their distance d and the factor f by which it falls with each
+doubling. Factors above that of second order are not used, though cables and quintic elements converge faster: an
+estimate is rather too large than too small. A distance that fell by more is not used either: errors of second and of
+higher order with opposite signs, as of a tapered cable, cancel on some mesh, where the distance is small by chance.
 """
 
 from __future__ import annotations
@@ -37,9 +36,9 @@ def finer(scene: Scene) -> Scene | None:
 
 
 def beyond(gap: float, last: float = np.nan) -> float:
-    """How far the finer of two meshes is from the limit of ever finer ones.
+    """Estimate the error of the finer of two meshes.
 
-    gap: how far the two differ; last: how far the coarser one differs from one of half its elements, nan if not known
+    gap: distance of the two; last: distance of the coarser one from one of half its elements, nan if not known
     """
     if not np.isfinite(last):
         return gap / (UNSEEN - 1.0)
@@ -138,7 +137,7 @@ def _with_errors(
 
 
 def _gaps(found: Modes, second: Modes | None) -> tuple[float, ...]:
-    """How far the eigenvalues are from those of a second run, relative; none where it has fewer modes."""
+    """Return the relative distances of the eigenvalues from those of a second run; none where it has fewer modes."""
     if second is None or len(second.modes) < len(found.modes):
         return ()
     pairs = zip(found.modes, second.modes, strict=False)
@@ -146,5 +145,5 @@ def _gaps(found: Modes, second: Modes | None) -> tuple[float, ...]:
 
 
 def _apart(one: complex, other: complex) -> float:
-    """How far two eigenvalues are apart, relative."""
+    """Return the relative distance of two eigenvalues."""
     return abs(one - other) / (abs(other) or abs(one) or 1.0)

@@ -52,8 +52,8 @@ class Mode:
 
     eigenvalue [1/s]: imaginary part the frequency of the oscillation [rad/s], real part its growth. shape: displacement
     of the coordinates, real and with shape' M shape = 1 where nothing is damped, (unknowns,). points: displacement
-    of the markers, (markers, d); angles: their turns, (markers,). hidden: whether the eigenvalue is 0 only as far as
-    round-off lets tell, which a motion that matters may hide behind. whirl: of a machine that turns, forward, backward
+    of the markers, (markers, d); angles: their turns, (markers,). hidden: whether the eigenvalue is 0
+    within round-off that may hide a motion that matters. whirl: of a machine that turns, forward, backward
     or none; rotating: whether the eigenvalue is that in the turning frame, as the motion has several at rest.
     """
 
@@ -92,7 +92,7 @@ class Mode:
 
     @property
     def kind(self) -> str:
-        """Oscillating, creeping back, free (nothing pulls back), untold (free or slower than can be told), unstable."""
+        """Return oscillating, creeping back, free (nothing pulls back), untold (free or indeterminate), unstable."""
         if self.eigenvalue.real > 1e-9 * abs(self.eigenvalue):
             return "unstable"
         if not self.eigenvalue:
@@ -147,9 +147,9 @@ class Modes:
 
     @property
     def verdict(self) -> tuple[str, str]:
-        """The status and why it is not ok.
+        """Return the status and why it is not ok.
 
-        ok, unbalanced, moving, unstable, cannot-be-told, coarse-mesh or beyond-theory
+        The status is ok, unbalanced, moving, unstable, cannot-be-told, coarse-mesh or beyond-theory.
         """
         kinds = [mode.kind for mode in self.modes]
         coarse = [number for number, error in enumerate(self.mesh_errors, 1) if error > COARSE]
@@ -264,7 +264,7 @@ def modes(
 
 
 def _but_for_gravity(scene: Scene, about: str) -> str:
-    """What helps a motion that gravity alone keeps from being steady, as that of a flexible shaft that lies."""
+    """Return advice for a motion that only gravity keeps from being steady, as of a horizontal flexible shaft."""
     if not np.any(scene.gravity):
         return ""
     try:

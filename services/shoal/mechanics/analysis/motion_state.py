@@ -71,7 +71,7 @@ def states(scene: Scene, times: Sequence[float]) -> tuple[Evaluator, list[State]
 
 
 def _numbers(model: Model, record: Marched, limits: Limits, end: float) -> Array:
-    """What the record of a run up to `end` [s] is judged by, (NUMBERS, 1)."""
+    """Return the numbers by which the record of a run up to `end` [s] is judged, (NUMBERS, 1)."""
     markers, numbers = len(model.marker_rows), np.empty((NUMBERS, 1))
     motion, turns = np.empty((1, markers, 2 * model.dimensions + 2, 1)), np.zeros((markers, 1))
     told(record, 1, 0, turns, limits.anchors, limits.energy_floor(end), limits.span, motion, numbers)

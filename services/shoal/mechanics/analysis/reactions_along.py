@@ -20,7 +20,7 @@ BLOCK = 64
 
 
 class Reaction(NamedTuple):
-    """What a joint exerts on its second body, friction included, at every sample.
+    """Reaction of a joint on its second body, friction included, at every sample.
 
     force [N], (samples, d); torque [N m], (samples,), in space a vector, (samples, 3); drive: in space that of a drive
     about its axis, (samples,)

@@ -1,8 +1,8 @@
-"""Reactions are not believed before another run agrees: they feel vibrations and steps that places hardly show.
+"""Verification of reactions by more careful runs: vibrations and steps change them more than positions.
 
 Forces follow from accelerations. Steps that are long enough for the motion may be too long for these, above all where
-nothing damps the axial vibration of stiff rods. So the forces are held against those of runs with other settings; if
-the run as stated is off, but two more careful ones agree, theirs are told.
+nothing damps the axial vibration of stiff rods. So the forces are compared with those of runs with other settings; if
+the run as stated is off, but two more careful ones agree, theirs are returned.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ def _largest(found: list[Reactions]) -> float | None:
 
 
 def _with(found: Reactions, other: Reactions, factor: float) -> Reactions:
-    """With so many times the errors of another run added."""
+    """Return reactions with the errors of another run, times a factor, added."""
     joints = {}
     for name, joint in found.joints.items():
         more = other.joints[name]

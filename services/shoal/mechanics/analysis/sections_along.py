@@ -28,9 +28,9 @@ class Section(NamedTuple):
 
 
 def section_along(felt: Felt, at: Attachment) -> Section:
-    """At a place of a rod, at a node just beyond it; the model has one lane.
+    """Return the section forces at a point of a rod, at a node just beyond it; the model has one lane.
 
-    Between the ends of an element forces are told as they change evenly. Raises InputError.
+    Between the ends of an element they are interpolated linearly. Raises InputError.
     """
     name, place = place_of(felt.scene, at)
     rod = felt.scene.bodies[name]

@@ -1,4 +1,4 @@
-"""An equilibrium within a tolerance: the mesh is refined until what is left of its error can be told and is small."""
+"""Static equilibrium within a tolerance: the mesh is refined until its estimated error is small enough."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SAFE = 2.0
 
 
 def settled(scene: Scene, tolerance: float, time: float = 0.0) -> Equilibrium:
-    """Where a machine comes to rest, its markers within a tolerance [m] of the limit of ever finer meshes.
+    """Return the equilibrium of a machine, with markers within a tolerance [m] of the limit of ever finer meshes.
 
     The elements of the scene's flexible rods are doubled together. With d the distance of two meshes in a row and f the
     factor by which it falls, the finer one is d / (f - 1) from the limit: its `mesh_error`. The coarsest mesh whose

@@ -1,9 +1,9 @@
-"""Squared frequencies of small motions, each with what round-off may be worth in it.
+"""Squared frequencies of small motions, each with a bound of its round-off.
 
-An eigenproblem solved at one stroke knows all its eigenvalues to round-off of the largest one, so that a rod beside it
-hides a pendulum. Here what is slow is taken out and solved again by itself, down to the slowest (Rayleigh and Ritz):
-an error e of a shape is worth e^2 of the stiff motions only. What is left is the round-off of the stiffness that the
-shape itself feels, |x|' B |x| with the bound B of its entries (Higham, Accuracy and Stability, ch. 3), and what rounded
+A single eigenvalue decomposition gives all eigenvalues with the round-off of the largest one: a stiff rod hides a
+pendulum. Here the slow subspace is projected out and solved again, down to the slowest (Rayleigh and Ritz): an error
+e of a shape changes its value by e^2 of the stiff motions only. What remains is the round-off of the stiffness along the
+shape, |x|' B |x| with the bound B of its entries (Higham, Accuracy and Stability, ch. 3), and what rounded
 places make of the stiffest motion of the part of the machine that the shape moves.
 """
 
@@ -39,7 +39,7 @@ class Tangent(NamedTuple):
     bound: Any
 
     def worth(self, left: npt.NDArray[Any], right: npt.NDArray[Any]) -> Array:
-        """What round-off is worth in left_k' matrix right_k, for every column k, (columns,)."""
+        """Return a bound of the round-off of left_k' matrix right_k, for every column k, (columns,)."""
         return np.asarray(np.sum(np.abs(left) * (self.bound @ np.abs(right)), axis=0))
 
 
@@ -99,7 +99,7 @@ def pull(scene: Scene) -> float:
 def hides(levels: Array | float, values: Array, least: float) -> bool:
     """Return whether round-off may hide a motion that matters among those that nothing seems to hold.
 
-    levels: of those, values: of all, least: of what is told else, such as `pull`; squared, all [rad^2/s^2]
+    levels: of those, values: of all, least: of other estimates, such as `pull`; squared, all [rad^2/s^2]
     """
     told = np.abs(values)[np.abs(values) > np.max(levels, initial=0.0)]
     slowest = min([*told, *([least] if least > 0 else [])], default=np.inf)

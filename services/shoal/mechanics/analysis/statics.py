@@ -53,11 +53,11 @@ GAPE = 1e-9
 
 
 def statics(scene: Scene, time: float = 0.0, *, leave_unstable: bool = True) -> Equilibrium:
-    """The equilibrium that a machine reaches from the start of its scene, with drives as they are at `time` [s].
+    """Return the equilibrium that a machine reaches from the start of its scene, with drives as they are at `time` [s].
 
     leave_unstable: go on from an unstable equilibrium (a column beyond its buckling load) to a stable one, where the
-    loads have a potential. With loads that have none the place is stable where no small motion grows, with the damping
-    of the machine. The message tells what is left out. Raises InputError if the scene cannot be modelled.
+    loads have a potential. Without a potential it is stable where no small motion grows, with the damping of the
+    machine. The message names neglected effects. Raises InputError if the scene cannot be modelled.
     """
     check(time=time)
     evaluator = Evaluator.of(scene, horizon=time)
@@ -121,7 +121,7 @@ class _Search:
         return self._judge(found, message)
 
     def _nudged(self, q: Array) -> Array:
-        """A place to descend from: to the side where nothing tells which one, as it is when something buckles."""
+        """Return a position to descend from, perturbed to one side where both are equal, as in buckling."""
         move, pull = self._soft(q)
         return q + KICK * move if pull < PULLED else q
 
@@ -146,7 +146,7 @@ class _Search:
         return lowest * (self.balance.size / float(np.max(np.abs(lowest)))), pull / total if total > 0 else 0.0
 
     def _start_angle(self, scene: Scene, at: Attachment) -> float:
-        """Of a machine in space: about z."""
+        """Return the start angle of an attachment, in space about z."""
         along = self.placement.start_of(self.placement.direction(scene, at))[0][:, 0]
         return float(plane.angle(along))
 
@@ -245,7 +245,7 @@ class _Search:
         return self._count(found)
 
     def _descended(self, q: Array) -> Found:
-        """Where the potential is lowest, downhill from q, or where the machine stops that creeps from there."""
+        """Return the minimum of the potential downhill from q, or the rest position after creeping from q."""
         go = self.balance.creep if self.evaluator.follows else self.balance.descend
         return self._count(go(q, self._turn, self._follow))
 
@@ -326,7 +326,7 @@ class _Search:
         return float(np.max(np.abs(change), initial=0.0))
 
     def _way(self, one: Array, other: Array) -> float:
-        """How far the bodies lie apart in two states (rms), relative to the machine's size."""
+        """Return the distance of the bodies in two states (RMS), relative to the machine's size."""
         change = other - one
         square = float(change @ (self.evaluator.mass @ change))
         return float(np.sqrt(max(0.0, square))) / float(self.balance.unit)
@@ -348,7 +348,7 @@ class _Search:
         self.angles = self.angles + _remainder(plane.angle(self.marker_lines.at(q).T) - self.angles)
 
     def _leave_out_spins(self, q: Array) -> None:
-        """What bodies may turn about their own axes from q on is no motion of the machine."""
+        """Exclude rotations of bodies about their own axes, which are no motion of the machine."""
         self.balance.left_out = self.balance.left_out[:0]
         self.balance.left_out, self.spinning = idle_spins(self.balance, self.placement, q)
 
@@ -384,7 +384,7 @@ def _directions(placement: Placement) -> dict[str, list[Any]]:
 
 
 def _vectors(frame: Any, size: float) -> list[Any]:
-    """Vectors [m] that tell how a body moves."""
+    """Return vectors [m] that define the motion of a body."""
     if isinstance(frame, PointFrame):
         return [frame.origin]
     if isinstance(frame, RigidFrame):

@@ -1,4 +1,4 @@
-"""What joints make common before any coordinate exists: places that coincide, directions that turn together."""
+"""Shared points and directions: joints identify points that coincide and directions that turn together."""
 
 from __future__ import annotations
 

@@ -202,7 +202,7 @@ class Loads:
         return len(self.fitted) - 1
 
     def _field(self, name: str, function: Function) -> str:
-        """Where a function of a load stands, or the load alone if that has made it."""
+        """Return the path of a function of a load, or of the load alone if that has made it."""
         return ".".join([f"loads.{name}", *(field for field, value in self.scene.loads[name] if value is function)])
 
     def _turn(self, first: Attachment, second: Attachment) -> Number:

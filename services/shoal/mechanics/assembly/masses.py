@@ -32,8 +32,8 @@ Entries = dict[tuple[int, int], Number]
 class Masses:
     """Matrices as entries (row, column), row >= column, the weight by unknown, and the flexible elements.
 
-    mass: the mass matrix; lent: what thin bodies are lent besides, see `_lent`; flat: whether one of them is flat;
-    stretching: what `Element.stretching` gives, of all rods, where their inertia is capped.
+    mass: the mass matrix; lent: added mass of thin bodies, see `_lent`; flat: whether one of them is flat;
+    stretching: of `Element.stretching`, of all rods, where their inertia is capped.
     """
 
     def __init__(self, scene: Scene, placement: Placement, rows: Rows) -> None:
@@ -187,11 +187,11 @@ def second_moments(body: Rod | RigidBody) -> list[list[Number]]:
 
 
 def _lent(matrix: list[list[Number]]) -> tuple[list[list[Number]], bool]:
-    """The second moment that a thin body is lent across its plane [kg m^2], and whether it is flat in some lane.
+    """Regularise the mass of a thin body: the added second moment across its plane [kg m^2], and whether it is flat.
 
-    How the director there moves is told by the other two. Without inertia of its own, constraints that touch it look as
-    if they depended on each other, and round-off is felt. What is lent is taken back: in accelerations, where a body is
-    flat, as `least.lent` does; in implicit steps by their iteration.
+    The motion of the director there follows from the other two. Without inertia of its own, constraints on it would be
+    nearly dependent in the metric of the mass matrix. The added mass is compensated: in accelerations of flat bodies by
+    iterative refinement (`least.lent`), in implicit steps by their iteration.
     """
     moments, axes = _principal(matrix)
     least, middle = moments[..., 0], moments[..., 1]

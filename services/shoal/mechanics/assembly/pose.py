@@ -1,4 +1,4 @@
-"""Where a body is at time zero."""
+"""Pose of a body at time zero."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ from shoal.scene import Scene
 
 @dataclass(frozen=True)
 class _Law:
-    """How a start depends on the angles of the bodies.
+    """Dependence of a start on the angles of the bodies.
 
     place, drift: coordinates and rates that do not, (unknowns,); along, across: A and B, (unknowns, bodies);
     turned, turns: relative angles of force elements at angles zero and their derivatives, (forces,), (forces, bodies)
@@ -47,7 +47,7 @@ class Starts:
         self._row = {path: row for row, path in enumerate((*self._angles, *self._rates))}
 
     def at(self, values: Mapping[str, Array], lanes: int) -> Model:
-        """The model with so many lanes that start with these numbers: path of an initial value -> (lanes,)."""
+        """Return the model with lanes that start with these numbers: path of an initial value -> (lanes,)."""
         scene = self._scene.with_lanes(values)
         if not values.keys() <= self._known:
             return with_start(self._model, scene, lanes)

@@ -23,13 +23,13 @@ REST, VARIANT, TOGETHER = 2, 3, 4
 
 @njit(error_model="numpy", forceinline=True)
 def of_one_variant(family: Family, number: int) -> int:
-    """How many elements from this one on are of its variant, at most eight."""
+    """Count the elements from this one on that are of its variant, at most eight."""
     return family.plan[PLAN * number + TOGETHER]  # type: ignore[no-any-return]
 
 
 @njit(error_model="numpy", forceinline=True)
 def together(tile: Tile, family: Family, number: int) -> int:
-    """How many elements from this one on are computed at once."""
+    """Return the number of elements from this one on that are computed at once."""
     return family.plan[PLAN * number + TOGETHER] if len(tile) == 1 else 1
 
 

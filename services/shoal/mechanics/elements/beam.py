@@ -6,7 +6,7 @@ stress-free one, whose arc length is s0, the strain energy is 1/2 int EA eps^2 +
     eps = |dr/ds0| - 1 = |r'|/|r0'| - 1,    kappa = d(theta - theta0)/ds0 = (theta' - theta0')/|r0'|,
 
 theta' = (r' x r'')/|r'|^2 the rate of turn of the tangent (Gerstmayr and Shabana 2006, eqs. 15 to 17, for
-r0 straight). Both vanish at r = r0 and under rigid motion whatever the parametrisation of r0 is.
+r0 straight). Both vanish at r = r0 and under rigid motion for any parametrisation of r0.
 Kelvin-Voigt material: N = EA (eps + eta deps/dt), M = EI (kappa + eta dkappa/dt).
 
 Scaled by powers of L, the vectors X = ((r2 - r1)/L, r1', L r1'', ..., r2', L r2'', ...) give p = r' and
@@ -56,7 +56,7 @@ COEFFICIENTS = 4
 
 
 def quadrature(vectors: int, axial: int, bending: int) -> Array:
-    """Gauss rules with so many points for the axial and the bending strain; equal rules share their points.
+    """Return Gauss rules with these numbers of points for axial and bending strain; equal rules share their points.
 
     Returns (points, 2 vectors): the coefficients of p and of c in X, the weight of eps, the weight of kappa.
     """

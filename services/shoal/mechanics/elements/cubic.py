@@ -253,7 +253,7 @@ def _is_of(family: Family, number: int, one: int, other: int) -> bool:
 
 @njit(error_model="numpy", forceinline=True)
 def _forces(tile, one, other, curved, damped, axial, bending, family, z, zdot, f, w, power):  # type: ignore[no-untyped-def]
-    """Of all elements of one variant or another."""
+    """Add the forces of all elements of one variant or another."""
     number = _first_of(family, one, other)
     while number < family.size:
         members = of_one_variant(family, number)
@@ -303,7 +303,7 @@ def _add_energy(tile, curved, axial, bending, family, number, count, lane, z, w,
 
 @njit(error_model="numpy", forceinline=True)
 def _add_energies(tile, curved, axial, bending, family, number, members, z, w, energy):  # type: ignore[no-untyped-def]
-    """Of `members` elements of one variant."""
+    """Add the energies of `members` elements of one variant."""
     count = members if len(tile) == 1 else 1
     for first in range(number, number + members, count):
         for lane in range(0, len(tile), len(EIGHT)):

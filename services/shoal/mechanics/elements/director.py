@@ -302,7 +302,7 @@ def _nodal_vectors_across(rod: Rod, s: Number) -> list[Number]:
 
 
 def _mass(density: Number, section: Section, length: Number) -> list[list[Number]]:
-    """That of the cable, and the polar inertia of the section on the directors, which are linear in between."""
+    """Return the mass of the cable, with the polar inertia of the section on the directors (interpolated linearly)."""
     cable = beam.mass_matrix(beam.CUBIC, density * section.area, length)
     polar = density * section.polar * length
     rows = [beam.padded(row) for row in cable]

@@ -1,4 +1,4 @@
-"""What placement and model need to know of a kind of flexible element."""
+"""Description of a kind of flexible element for placement and model."""
 
 from __future__ import annotations
 

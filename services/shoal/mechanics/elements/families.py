@@ -26,8 +26,8 @@ class Family(NamedTuple):
 
     side: rows of one element. damped: whether any loses energy in itself, otherwise rates are not looked at. table:
     quadrature rules back to back. plan: PLAN numbers an element. rows: `side` an element. coefficients: (numbers *
-    size, lanes); reference: the stress-free shape where the kernel needs it, (any, lanes). spare: so many lanes at the
-    end of the tile belong to nobody, and need no force; whole vectors of them.
+    size, lanes); reference: the stress-free shape where the kernel needs it, (any, lanes). spare: unused
+    lanes at the end of the tile, whole vectors of them, which need no force.
     """
 
     size: int
@@ -42,7 +42,7 @@ class Family(NamedTuple):
 
 
 class Kernel(NamedTuple):
-    """Of one element: rows, coefficients, and the first of these that is a stiffness."""
+    """Sizes for one element: rows, coefficients, and the first of these that is a stiffness."""
 
     side: int
     coefficients: int

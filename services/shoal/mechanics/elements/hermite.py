@@ -9,7 +9,7 @@ from shoal.mechanics.numerics.tuples import plus, times
 
 @njit(error_model="numpy", forceinline=True)
 def _factors(x):  # type: ignore[no-untyped-def]
-    """Of D, r1' and r2' in r' and in L r''."""
+    """Return the factors of D, r1' and r2' in r' and in L r''."""
     return (
         6.0 * x * (1.0 - x),
         1.0 - 4.0 * x + 3.0 * x * x,

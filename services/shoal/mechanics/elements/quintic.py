@@ -40,7 +40,7 @@ class Quintics(Family):
 
 
 def recommended(elements: int) -> Array:
-    """The rule with the least error on coarse meshes, for a rod of so many elements.
+    """Return the rule with the least error on coarse meshes, for a rod of n elements.
 
     Four points do not see the stretch r' = P_4. Neighbours, which share r' and r'', forbid it; a rod of one element
     needs a fifth point.
@@ -200,7 +200,7 @@ def _force(
 
 @njit(error_model="numpy", forceinline=True)
 def _forces(tile, curved, damped, rule, family, number, members, z, zdot, f, w, power):  # type: ignore[no-untyped-def]
-    """Of `members` elements of one variant: its constants are made ready once for all of them."""
+    """Add the forces of `members` elements of one variant, with its constants prepared once."""
     count = members if len(tile) == 1 else 1
     for first in range(number, number + members, count):
         for lane in range(0, len(tile) - family.spare, len(EIGHT)):

@@ -273,7 +273,7 @@ _POINTS = np.polynomial.legendre.leggauss(3)
 
 
 def _mass(density: Number, section: Section, length: Number) -> list[list[Number]]:
-    """That of the cable, and the inertia of the sections, whose normal is of second degree."""
+    """Return the mass of the cable, with the inertia of the sections, whose normal is of second degree."""
     rows = [beam.padded(row) for row in beam.mass_matrix(beam.CUBIC, density * section.area, length)]
     full = [*rows[:2], [0.0] * 6, *rows[2:], [0.0] * 6]
     for xi, weight in zip(*_POINTS, strict=True):

@@ -95,7 +95,7 @@ def strains(z, inverse):  # type: ignore[no-untyped-def]
 
 @njit(error_model="numpy", forceinline=True)
 def _seen(p, u, e, w):  # type: ignore[no-untyped-def]
-    """How the parts of p along e and across it change, when p does by u and e turns by w."""
+    """Return the changes of the parts of p along and across e, for a change u of p and a rotation w of e."""
     return dot(e, u) + cross(e, p) * w, cross(e, u) - dot(e, p) * w
 
 
@@ -228,7 +228,7 @@ def _parts_change(bent, along, across, dtau, dphi, stiff, stresses):  # type: ig
 
 @njit(error_model="numpy", forceinline=True)
 def _back_change(p, u, e, w, along, across, dalong, dacross):  # type: ignore[no-untyped-def]
-    """How `_back` changes, when p does by u, e turns by w, and along and across change so."""
+    """Return the change of `_back` for a change u of p, a rotation w of e, and changes of along and across."""
     more, turn = _back(p, e, dalong, dacross)
     a, t = _seen(p, u, e, w)
     return plus(more, w, plus(times(along, quarter(e)), -across, e)), turn + along * t - across * a
@@ -265,7 +265,7 @@ def _node_change(s, u, d, w, numbers, by_tau, dby_tau):  # type: ignore[no-untyp
 
 @njit(error_model="numpy", forceinline=True)
 def change(z, v, stiff, free):  # type: ignore[no-untyped-def]
-    """How the derivatives of the energy change when z does by v: the stiffness times v."""
+    """Return the change of the derivatives of the energy for a change v of z: the stiffness times v."""
     inverse, ea, ga, _ = stiff
     s1, d1, s2, d2 = z[2:4], z[4:6], z[8:10], z[10:12]
     v1, v2, p, u = v[4:6], v[10:12], _middle(z, inverse), _middle(v, inverse)

@@ -10,8 +10,9 @@ the elements of the plane have a force of their own, which is cheaper as well. B
 directions, and twisting costs nothing.
 
 Kelvin-Voigt material: N = EA (eps + eta deps/dt), M = EI (k + eta dk/dt). dk/dt is that of the size of the curvature,
-k dk/dt over k: a curvature that turns about the axis loses nothing, since without a frame of the section nobody can
-tell it from a rigid turn. Where the element is straight, k^2 below `STRAIGHT`, M has no direction, and no damping part.
+k dk/dt over k: a curvature that turns about the axis loses nothing, since without a frame of the section
+it cannot be separated from a rigid rotation. Where the element is straight, k^2 below `STRAIGHT`, M has no direction,
+and no damping part.
 
 Coefficients of an element are those of `beam`; it has no reference. Rows: x, y, z of each nodal vector in turn.
 """

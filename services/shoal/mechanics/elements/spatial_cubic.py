@@ -161,7 +161,7 @@ def _force(
 
 @njit(error_model="numpy", forceinline=True)
 def _forces(tile, damped, axial, bending, family, number, members, z, zdot, f, w, power):  # type: ignore[no-untyped-def]
-    """Of `members` elements of one variant: its constants are made ready once for all of them."""
+    """Add the forces of `members` elements of one variant, with its constants prepared once."""
     count = members if len(tile) == 1 else 1
     for first in range(number, number + members, count):
         for lane in range(0, len(tile) - family.spare, len(EIGHT)):

@@ -43,7 +43,7 @@ STRIDES = 100
 
 
 class Choice(NamedTuple):
-    """Which integrator runs, why, and the largest step [s] it may take (infinite if nothing limits it)."""
+    """Choice of an integrator: its name, the reason, and its largest step [s] (infinite without a limit)."""
 
     name: str
     reason: str
@@ -89,7 +89,7 @@ def choose(solver: Solver, model: Model, tile: Tile, lanes: slice, name: str | N
 
 
 def halting(solver: Solver, model: Model, name: str, end: float) -> Halts:
-    """Where the steps of an integrator end in a run up to `end` [s] because of functions of time, and force laws."""
+    """Return the breakpoints of a run up to `end` [s]: of functions of time, and of force laws."""
     if not facts(name).adaptive:
         return halts(model, end, solver.step, False)
     longest = solver.max_step if solver.max_step is not None else solver.duration / STRIDES

@@ -67,7 +67,7 @@ def begin(tile: Tile, m: Arrays, w: Work, c: Control) -> bool:
 
 @njit(cache=True, error_model="numpy")
 def first_trial(c: Control, rest: float) -> float:
-    """The step to try [s]: the suggestion, or all of the rest if hardly more is left."""
+    """Return the step to try [s]: the suggestion, or all of the rest if little more is left."""
     suggested: float = c.suggestion[0]
     return rest if suggested * 1.01 >= rest else suggested
 

@@ -1,4 +1,4 @@
-"""Where a step is likely to end: what its method foretells, or the last steps continued, whichever was nearer before.
+"""Predictor of implicit steps: that of the method, or extrapolation of the last steps, whichever was nearer before.
 
 A method's own guess takes fast vibrations of stiff parts for motion, as h^2 times their acceleration is far. The
 coordinates of the last steps q, with their backward differences D q, know them as small as they are: a polynomial of

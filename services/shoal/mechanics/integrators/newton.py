@@ -185,7 +185,7 @@ def begin(
 
 @njit(cache=True, error_model="numpy")
 def judge(tile: Tile, m: Arrays, w: Work, newton: Newton, iteration: int, limit: int) -> int:
-    """What the last change of the coordinates, still in the residual, says of the iteration of this number.
+    """Judge the iteration of this number by the last change of the coordinates, which is still in the residual.
 
     LOST: w and the multipliers are those of the first guess again. limit: the last iteration.
     """
@@ -259,7 +259,7 @@ def solve(tile: Tile, m: Arrays, w: Work, newton: Newton, t: float, mass_factor:
     """Find the end of a step at the time t: M a + C_q' lambda = Q(q, v, t), C(q) = 0; returns the iterations.
 
     The method ties rates and accelerations to coordinates: dv = damping_factor dq, da = mass_factor dq. w holds the
-    first guess, of a step that `guess.start` was told of, then the solution. The power that is left in w is that of the
+    first guess, of a step begun by `guess.start`, then the solution. The power that is left in w is that of the
     last guess; see `take_power`.
     """
     residual = newton.residual

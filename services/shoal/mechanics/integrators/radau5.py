@@ -181,7 +181,7 @@ def _solve(tile: Tile, scheme: Radau5, m: Arrays, w: Work, h: float, s: int) -> 
 
 @njit(cache=True, error_model="numpy")
 def _guess(tile: Tile, scheme: Radau5, m: Arrays, w: Work, h: float) -> None:
-    """First stages: the rates that the last step's polynomial foretells, and what follows from them."""
+    """Set the first stages: the rates predicted by the last step's polynomial, and what follows from them."""
     end = m.unknowns * len(tile)
     q, v, p = scheme.stage_q, scheme.stage_v, scheme.polynomial
     last = scheme.last[0]
@@ -373,7 +373,7 @@ def inside(tile: Tile, scheme: Radau5, m: Arrays, w: Work, past: Array, x: float
 
 @njit(cache=True, error_model="numpy")
 def anew(scheme: Radau5) -> None:
-    """The last step foretells nothing."""
+    """Forget the polynomial of the last step."""
     scheme.last[0] = 0.0
 
 

@@ -94,7 +94,7 @@ def averages(scheme: Any) -> bool:
 def implement(settings: type, step: Any, facts: Facts, inside: Any = dense.quintic, anew: Any = None) -> None:
     """Let compiled calls with settings of this type run the kernel `step`, and `inside` for the motion within it.
 
-    anew: forgets what a scheme remembers from step to step, if anything. The parameters of the kernels are named as
+    anew: restarts a scheme that remembers earlier steps. The parameters of the kernels are named as
     those of `advance`, `interpolate` and `restart`.
     """
     choose(advance, settings, step, forceinline=True)

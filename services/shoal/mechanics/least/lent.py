@@ -1,11 +1,11 @@
-"""Flat bodies are lent mass, and it is taken back.
+"""Mass regularisation of flat bodies, with iterative refinement.
 
-A flat body moves no mass along the axis across its plane: the mass matrix is singular there, and only what holds its
-directors together tells how that axis moves. In the metric of such a matrix constraints on it look as if they depended
-on each other. So what is factored is M + N with lent mass N, and the acceleration a = a_0 + a_1 + ... by the true mass
-matrix follows from that by the other: each term is what the lent mass of the one before, N a_k, moves within the
-constraints. Wherever directors stay at right angles, the lent mass moves less than the part `masses.THIN` of the body's
-own energy, and the terms fall as fast.
+A flat body moves no mass along the axis across its plane: the mass matrix is singular there, and only the constraints
+of its directors define the motion of that axis. In the metric of such a matrix constraints on it are nearly dependent.
+So the regularised matrix M + N is factored, with added mass N. The acceleration a = a_0 + a_1 + ... by the true mass
+matrix follows from it: each term is the response to the added mass of the one before, N a_k, within the constraints.
+While directors stay at right angles, the added mass has less energy than the part `masses.THIN` of the body's own
+energy, and the terms fall as fast.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def take_back_from_group(tile: Tile, m: Arrays, w: GaussWork, lane: int, rank: i
 
 @njit(cache=True, error_model="numpy")
 def _load(tile: Tile, m: Arrays, w: GaussWork) -> None:
-    """From w.moved, as D^1/2 L' a, to what the lent mass makes of it in w.lent, as D^-1/2 L^-1 N a."""
+    """Set w.lent, D^-1/2 L^-1 N a, the load of the added mass, from w.moved, D^1/2 L' a."""
     sparse.backward(tile, m.pattern, m.mass_factor, m.mass_root, w.moved, 0)
     sparse.multiply(tile, m.pattern, m.lent, w.moved, w.lent)
     sparse.forward(tile, m.pattern, m.mass_factor, m.mass_root, w.lent, 0)

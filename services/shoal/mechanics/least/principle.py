@@ -55,7 +55,7 @@ def constrain(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array,
     """Turn the forces Q in `a` into the true acceleration; the multipliers go into w.multiplier.
 
     tolerance: distance from a singular position, relative to a row's length, below which third derivatives take over.
-    They tell the acceleration there up to the distance d itself. The constraints tell it up to eps/d^2: round-off eps
+    Those define the acceleration up to the distance d itself, the constraints up to eps/d^2: round-off eps
     in C_q v leaves the rate of the weakest direction uncertain by eps/d, and its acceleration by that over d. So the
     best tolerance is about the cube root of eps.
     """

@@ -2,7 +2,7 @@
 
 With M = L D L' and y = D^1/2 L' a, Gauss's function is 1/2 |y - y_f|^2 and every constraint one row w . y = -g, so the
 minimiser moves y_f by the least norm. The rows are orthonormalised with pivoting (Gram and Schmidt, each row twice);
-what is left of a row when it depends on the others, compared with its own length, is a distance from the singular
+the remainder of a row that depends on the others, relative to its own length, is a distance from the singular
 position, not its square. One lane at a time, on contiguous work space.
 
 At a singular position the minimiser is in general not the limit of the motion: see `branch`.
@@ -95,7 +95,7 @@ def orthonormalise(rows: Array, triangle: Array, norms: Array, order: Index, tol
 
 @njit(cache=True, error_model="numpy")
 def left(rank: int, rows: Array) -> float:
-    """What is left of the rows that depend on the basis, as a part of their lengths."""
+    """Return the remainders of the rows that depend on the basis, relative to their lengths."""
     longest = 0.0
     for k in range(rank, rows.shape[0]):
         longest = max(longest, dot(rows[k], rows[k]))

@@ -46,7 +46,7 @@ class GaussWork(NamedTuple):
     gram: (constraints^2, lanes). multiplier, gap: (constraints, lanes). extra, moved, lent: (unknowns, lanes), for
     the two last see `lent`. branch: tangent of the motion at a singular position, (rows, lanes). near: whether a lane
     is at a singular position, HERE, else 0, (lanes,). closeness: inverse square of the smallest distance from singular
-    positions so far, what is left of a row without the others as a part of its length, (lanes,); 0: not known. ended:
+    positions so far, the remainder of a row relative to its length, (lanes,); 0: not known. ended:
     by lane the instant [s] from which its motion is no number, then the constraint that could not be closed, or
     UNENDED.
     """

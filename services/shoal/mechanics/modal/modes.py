@@ -50,9 +50,9 @@ def shapes_of(scene: Scene, name: str) -> Shapes:
 
 
 def held(scene: Scene, name: str) -> Ends:
-    """How the ends of a rod are held in its frame: where a joint keeps its direction the frame is tangent to it.
+    """Return how the ends of a rod are held in its frame: tangent where a joint keeps its direction.
 
-    Otherwise joints hold places of it, and the frame goes through them.
+    Otherwise joints hold points of it, and the frame goes through them.
     """
     rod = scene.bodies[name]
     assert isinstance(rod, Rod)
@@ -77,7 +77,7 @@ def held(scene: Scene, name: str) -> Ends:
 
 
 def bent(scene: Scene, name: str, place: tuple[Number, ...]) -> tuple[Number, Number, Number, Number]:
-    """Of a body at the start: a place x + iy [m] and its rate [m/s] in its frame, its turn there [rad] and rate."""
+    """Return a point x + iy [m] of a body at the start, its rate [m/s] in its frame, its rotation [rad] and rate."""
     where, start = place[0] + 1j * place[1], scene.initial.get(name)
     if start is None or not (len(start.modes) or len(start.mode_rates)):
         return where, 0.0, 0.0, 0.0

@@ -1,4 +1,4 @@
-"""What the mechanics needs to know of a body's modes."""
+"""Integrals of a body's modes."""
 
 from __future__ import annotations
 

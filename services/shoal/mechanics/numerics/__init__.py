@@ -1,1 +1,1 @@
-"""What kernels are made of: tiles of lanes, rows of numbers, sparse factors, calls through an address."""
+"""Building blocks of kernels: tiles of lanes, rows of numbers, sparse factors."""

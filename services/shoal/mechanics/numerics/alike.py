@@ -43,7 +43,7 @@ class Alike(NamedTuple):
 def analyse(
     unknowns: int, dimensions: int, entries: dict[tuple[int, int], Array]
 ) -> tuple[int, dict[tuple[int, int], Array]]:
-    """How many components share one matrix, the space's dimensions or 1, and its entries."""
+    """Return the number of components that share one matrix, the space's dimensions or 1, and its entries."""
     d = dimensions
     shared = {(i // d, j // d): value for (i, j), value in entries.items() if i % d == 0 == j % d}
     for i, j in entries:

@@ -1,4 +1,4 @@
-"""What pairs alone have of `tuples`: vectors of the plane."""
+"""Operations of planar vectors, in addition to `tuples`."""
 
 from __future__ import annotations
 

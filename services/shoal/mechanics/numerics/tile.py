@@ -26,7 +26,7 @@ WIDE: Tile = (0,) * 16
 
 
 def tiles(lanes: int) -> tuple[Tile, list[slice]]:
-    """The tile to use for so many lanes, and the lanes that each tile holds."""
+    """Return the tile for a number of lanes, and the lanes of each tile."""
     tile = SINGLE if lanes == 1 else WIDE
     return tile, [slice(begin, min(begin + len(tile), lanes)) for begin in range(0, lanes, len(tile))]
 

@@ -1,4 +1,4 @@
-"""What triples alone have of `tuples`: vectors of space."""
+"""Operations of spatial vectors, in addition to `tuples`."""
 
 from __future__ import annotations
 

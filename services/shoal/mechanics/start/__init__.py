@@ -1,1 +1,1 @@
-"""The start of a machine: poses and rates that agree with its joints and with what is stated."""
+"""The start of a machine: poses and rates that agree with its joints and with the stated values."""

@@ -306,8 +306,8 @@ def _summed(vector: Affine, constant: Array, q: Array) -> Array:
 def changes(scene: Scene, used: Mapping[str, InitialState], size: Number, lanes: int = 1) -> list[dict[str, Any]]:
     """Return the stated values that are not used, of every lane: body -> quantity -> stated, used.
 
-    Round-off of any size [m] is left out. An angle or rate in space is told as the rotation or spin where what is used
-    is not about z.
+    Round-off of any size [m] is left out. An angle or rate in space is returned as the rotation or spin where it is not
+    about z.
     """
     found: list[dict[str, Any]] = [{} for _ in range(lanes)]
     turning, moving = (_largest_stated(scene, lanes, *some) for some in (("rate", "spin"), ("velocity",)))

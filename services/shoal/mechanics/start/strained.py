@@ -20,7 +20,7 @@ def gives_way(scene: Scene) -> bool:
 def numbers_of_start(scene: Scene) -> Iterator[tuple[str, str]]:
     """Yield fields of joints and loads that take a number from the start, or its side, and the field to state instead.
 
-    In space the stated rotations alone tell axes and what welds keep, so that these need no start that closes.
+    In space axes and welded rotations follow from the stated rotations, and need no start that closes.
     """
     for name, one in of_scene(scene):
         if isinstance(one, Turned) and one.angle is None and scene.dimensions == 2:

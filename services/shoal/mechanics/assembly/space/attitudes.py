@@ -1,4 +1,4 @@
-"""How bodies are turned at the start as the scene states it, and which of them joints keep turned alike."""
+"""Stated rotations of bodies at the start, and bodies that joints keep at equal rotations."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from shoal.scene import GROUND, Attachment, Rod, Scene
 class Attitudes:
     """Rotations (3, 3, lanes) and spins [rad/s] (3, lanes) of all bodies at time zero.
 
-    A body that says nothing is turned as the angle of a joint tells from its neighbour, else not at all, as in the
+    A body without a stated rotation has that of its neighbour plus the angle of their joint, else none, as in the
     plane. kept: bodies that joints lock. Raises InputError if joints keep other angles between the same two bodies.
     """
 
@@ -79,7 +79,7 @@ class Attitudes:
         return vector(*start.spin) if start.spin is not None else vector(0.0, 0.0, start.rate)
 
     def _told(self) -> dict[str, Array]:
-        """The rotation of every body as it is stated, as the angle of a joint tells it from a neighbour, or none."""
+        """Return the rotation of every body: stated, or that of a neighbour plus the angle of their joint, or none."""
         none = np.eye(3)[..., None]
         found = {body: stated for body in self._scene.bodies if (stated := self.stated(body)) is not None}
         found[GROUND] = none

@@ -88,7 +88,7 @@ class SpatialPlacement(Placement):
     def keep_mesh(self, name: str, condition: Geared) -> None:
         """Require the weighted sum of the angles about axes at rest that the start has, but for whole teeth.
 
-        Each angle is that of a vector across its axis, so that two of its components tell it, as in the plane.
+        Each angle is that of a vector across its axis, of which it needs two components, as in the plane.
         """
         parts = []
         for side, axis, factor in zip(condition.sides, condition.axes, condition.factors, strict=True):

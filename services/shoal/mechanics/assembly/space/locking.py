@@ -2,8 +2,8 @@
 
 Axes that are to be parallel and differ in the sixth digit leave a linkage no freedom. What holds it is a row of the
 constraints that nearly depends on others. It does so near a singular position as well; but there the dependence ends a
-short way on, while a rounded machine keeps it wherever it would go. A short lever keeps it as well: what is large for
-numbers of so many digits is one.
+short way on, while a rounded machine keeps it wherever it would go. A short lever keeps it as well: it is one where the
+dependence is large for the digits of the numbers.
 """
 
 from __future__ import annotations
@@ -78,14 +78,14 @@ def _decimals(number: Any) -> int:
 
 
 class Lock(NamedTuple):
-    """What locks a machine: numbers of the rows, and how far they are from a dependence."""
+    """Rows that lock a machine, and their distance from a dependence."""
 
     rows: list[int]
     off: float
 
 
 def lock(gap: Callable[[Array], Array], slope: Callable[[Array], Array], q: Array) -> Lock | None:
-    """What locks a machine at the coordinates q, (unknowns,), by the least.
+    """Return the rows that lock a machine at the coordinates q, (unknowns,), with the smallest distance.
 
     gap: (rows,), and slope: (rows, unknowns), of constraints in units in which a row that nothing cancels has about
     unit length

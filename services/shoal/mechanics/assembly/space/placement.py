@@ -167,7 +167,7 @@ class _Rigid:
         return vector(*point.local(self.name)) - self.p
 
     def hinged(self, axis: JointAxis, others: list[JointPoint]) -> tuple[Affine, ...]:
-        """Of a body that turns about an axis at rest: one direction at a right angle to it tells them all."""
+        """Return the vectors of a body that turns about a fixed axis: one direction at right angles defines all."""
         name, result = self.name, self.result
         assert axis.where is not None
         normal, image = axis.where.constant, axis.local(name)
@@ -212,7 +212,7 @@ class _Rigid:
         return tuple(combined(tuple(basis), tuple(images[:, k])) for k in range(3))
 
     def free(self, axes: list[JointAxis], others: list[JointPoint]) -> tuple[Affine, ...]:
-        """Of any other body: three vectors whose products are kept."""
+        """Return the vectors of any other body: three whose products are constrained."""
         name, result = self.name, self.result
         chosen: list[_Chosen] = []
         for known in (True, False):
@@ -253,7 +253,7 @@ class _Rigid:
 
 @dataclass(frozen=True)
 class _Chosen:
-    """A vector that tells how a body is turned; image: in the body's frame; lengths: the power of a length it has."""
+    """A vector that defines the rotation of a body; image: in the body's frame; lengths: its power of a length."""
 
     image: Array
     where: Affine

@@ -1,7 +1,7 @@
-"""What joints hold of the direction of flexible rods, as dot products of directions.
+"""Constraints of joints on the direction of flexible rods, as dot products of directions.
 
 The slope of a rod stretches, so that only its right angles can be held by products; a director is a unit vector. Two
-sections hold each other by as many products of slopes and directors as they keep rotations; where these do not tell
+sections hold each other by as many products of slopes and directors as they keep rotations; where these do not fix
 the rotation, the section of one gets further axes as vectors (`section_axes`).
 """
 
@@ -25,9 +25,9 @@ INDEPENDENT = 0.3
 
 
 def hold_rod(scene: Scene, name: str, condition: Aligned | Turned | Square, result: SpatialPlacement) -> None:
-    """What a joint holds of the direction of a flexible rod: of a cable the axis only, since no section can turn.
+    """Add the constraints of a joint on the direction of a flexible rod: of a cable the axis only.
 
-    Raises InputError for what a rod cannot be held by.
+    Raises InputError for joints that a rod cannot have.
     """
     if isinstance(condition, Turned):
         _weld(scene, name, condition, result)

@@ -1,4 +1,4 @@
-"""Vectors along the axes of a rod's section that joints want at a node, beyond the slope and the director it has.
+"""Vectors along the axes of a rod's section that joints need at a node, besides its slope and director.
 
 A joint asks for a direction: the slope is one, whose length is free, and the director, a unit vector. Others are made
 when first asked for, with a small inertia (`masses.LENT`): the section's third axis, at right angles to both, and the
@@ -22,7 +22,7 @@ from shoal.scene import Attachment, Scene
 
 
 def field_of(scene: Scene, name: str) -> str:
-    """Where the scene has a joint or a load of that name."""
+    """Return the path of the joint or load of that name in the scene."""
     return f"joints.{name}" if name in scene.joints else f"loads.{name}"
 
 

@@ -32,7 +32,7 @@ def flexible(scene: Scene, body: str) -> Rod | None:
 
 
 def material(scene: Scene, body: str, place: Place) -> Place:
-    """A place of an unstrained body in its own frame [m]; of a flexible rod the arc length tells it."""
+    """A place of an unstrained body in its own frame [m]; of a flexible rod by its arc length."""
     rod = flexible(scene, body)
     return place if rod is None else tuple(unstrained(rod, place[0])[0])
 
@@ -93,7 +93,7 @@ def chosen_elements(scene: Scene, attitudes: Attitudes) -> dict[str, Element]:
 def shared(
     scene: Scene, attitudes: Attitudes, elements: dict[str, Element], side: Attachment, axis: Any
 ) -> tuple[Owner, Array] | None:
-    """Who has an axis as a vector of its own, and the vector in its frame; None for a rod that has not."""
+    """Return the owner of an axis as a vector of its own, and the vector in its frame; None for a rod without it."""
     if is_stiff(scene, side.body):
         return side.body, attitudes.image(side.body, axis)
     rod, element = flexible(scene, side.body), elements[side.body]

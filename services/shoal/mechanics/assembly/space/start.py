@@ -219,7 +219,7 @@ class _Closing:
     def _check_strain(self, before: Array, after: Array, lane: int) -> None:
         """Raises InputError where closing the joints would bend or stretch a rod that starts unstrained.
 
-        One that may start strained must not tell numbers of joints and loads then.
+        One that may start strained must not define numbers of joints and loads then.
         """
         for name, frame in self.placement.frames.items():
             if isinstance(frame, BeamFrame):

@@ -1,4 +1,4 @@
-"""Where the nodes of a flexible rod are guessed that starts strained: between the places and sections that joints hold.
+"""Initial guess of the nodes of a flexible rod that starts strained, between points and sections held by joints.
 
 From one held place to the next the unstrained shape is displaced by a cubic of the arc length, which turns with the
 sections that are held, and the sections between them turn evenly; a rod that is too long bulges to its softer side,
@@ -81,7 +81,7 @@ def section_at(scene: Scene, result: SpatialPlacement, side: Attachment) -> Arra
 
 
 def _held_sections(scene: Scene, name: str, rod: Rod, result: SpatialPlacement) -> dict[int, Array]:
-    """How welds turn the sections of nodes from the unstrained start."""
+    """Return the rotations of sections by welds, from the unstrained start."""
     found = {}
     for _, weld in joints.of_scene(scene):
         if not isinstance(weld, Turned) or weld.driven:
