@@ -1,10 +1,10 @@
 """Squared frequencies of small motions, each with a bound of its round-off.
 
 A single eigenvalue decomposition gives all eigenvalues with the round-off of the largest one: a stiff rod hides a
-pendulum. Here the slow subspace is projected out and solved again, down to the slowest (Rayleigh and Ritz). An
-error e of a shape changes its value by e^2 of the stiff motions only. What remains is the round-off of the stiffness along the
-shape, |x|' B |x| with the bound B of its entries (Higham, Accuracy and Stability, ch. 3), and what rounded
-places make of the stiffest motion of the part of the machine that the shape moves.
+pendulum. Here the slow subspace is projected out and solved again, down to the slowest (Rayleigh and Ritz). An error e
+of a shape changes its value by e^2 of the stiff motions only. What remains is the round-off of the stiffness along the
+shape, |x|' B |x| with the bound B of its entries (Higham, Accuracy and Stability, ch. 3), and the effect of rounded
+positions on the stiffest motion of the part of the machine that the shape moves.
 """
 
 from __future__ import annotations
