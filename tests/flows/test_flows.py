@@ -204,22 +204,42 @@ def test_a_night_is_a_run_with_a_metric_per_line(capsys: pytest.CaptureFixture[s
     [
         ("dance", {}, "dance"),
         ("forward", {"colour": "red"}, "colour"),
-        ("forward", {"scene": "nothing"}, "nothing"),
+        pytest.param(*("forward", {"scene": "nothing"}, "nothing"), marks=pytest.mark.slow),
         ("sweep", {"scene": "single-pendulum", "vary": "{initial.OA.angle: [0, 1]}"}, "vary"),
-        ("sweep", {"scene": "single-pendulum", "vary": "{initial.OA.angle: [0, 1, 2.5]}"}, "vary"),
-        ("sweep", {"scene": "single-pendulum", "vary": "{initial.OA.angle: [0, 1, 0]}"}, "vary"),
-        ("sweep", {"scene": "single-pendulum", "vary": "{}"}, "vary"),
-        ("sweep", {"vary": "7"}, "vary"),
+        pytest.param(
+            *("sweep", {"scene": "single-pendulum", "vary": "{initial.OA.angle: [0, 1, 2.5]}"}, "vary"),
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            *("sweep", {"scene": "single-pendulum", "vary": "{initial.OA.angle: [0, 1, 0]}"}, "vary"),
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(*("sweep", {"scene": "single-pendulum", "vary": "{}"}, "vary"), marks=pytest.mark.slow),
+        pytest.param(*("sweep", {"vary": "7"}, "vary"), marks=pytest.mark.slow),
         ("identify", {"methods": "[guess]"}, "guess"),
-        ("identify", {"methods": "[afsa, afsa]"}, "methods.* afsa is given twice"),
-        ("identify", {"seeds": "0,1,0"}, "seeds.* 0 is given twice"),
-        ("compare", {"scene": "single-pendulum", "engines": "gauss"}, "engines"),
-        ("compare", {"scene": "single-pendulum", "engines": "[gauss, gauss]"}, "two different"),
+        pytest.param(
+            *("identify", {"methods": "[afsa, afsa]"}, "methods.* afsa is given twice"), marks=pytest.mark.slow
+        ),
+        pytest.param(*("identify", {"seeds": "0,1,0"}, "seeds.* 0 is given twice"), marks=pytest.mark.slow),
+        pytest.param(*("compare", {"scene": "single-pendulum", "engines": "gauss"}, "engines"), marks=pytest.mark.slow),
+        pytest.param(
+            *("compare", {"scene": "single-pendulum", "engines": "[gauss, gauss]"}, "two different"),
+            marks=pytest.mark.slow,
+        ),
         ("export", {"scene": "single-pendulum", "to": "csv,step"}, "to: no form 'step'; there are exudyn, mjcf, fmu"),
-        ("export", {"scene": "single-pendulum", "to": "csv", "inputs": "gravity.1"}, "`to` has no fmu"),
+        pytest.param(
+            *("export", {"scene": "single-pendulum", "to": "csv", "inputs": "gravity.1"}, "`to` has no fmu"),
+            marks=pytest.mark.slow,
+        ),
         ("sweep", {"vary": "{gravity.1: [-9, 0, 1]}"}, "one value is not at both ends"),
-        ("sweep", {"vary": "{gravity.1: [-9, 0, 2], gravity.1: [0, 9, 2]}"}, "the key 'gravity.1' stands twice"),
-        ("export", {"scene": "flexible-double-pendulum", "to": "csv,mjcf"}, "MJCF has no ancf-cable"),
+        pytest.param(
+            *("sweep", {"vary": "{gravity.1: [-9, 0, 2], gravity.1: [0, 9, 2]}"}, "the key 'gravity.1' stands twice"),
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            *("export", {"scene": "flexible-double-pendulum", "to": "csv,mjcf"}, "MJCF has no ancf-cable"),
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_bad_parameters_are_refused_in_one_line(flow: str, parameters: dict[str, str], word: str) -> None:
@@ -365,8 +385,9 @@ PASSED: list[tuple[str, dict[str, str], set[str]]] = [
 @pytest.mark.parametrize(
     ("scene", "axes", "flow", "asked", "artifacts"),
     [
-        # Lanes of rods in space have a time loop to compile that no other test needs.
-        pytest.param(scene, axes, *passed, marks=[pytest.mark.slow] * (scene is strip and passed[0] == "sweep"))
+        # By day the strip passes through all but the sweep, whose lanes take a loop of their own, and the modal rod
+        # through that.
+        pytest.param(scene, axes, *passed, marks=[pytest.mark.slow] * ((scene is strip) == (passed[0] == "sweep")))
         for scene, axes in ((strip, "xyz"), (modal, "xy"))
         for passed in PASSED
     ],

@@ -33,6 +33,10 @@ from shoal.mechanics.numerics.tile import tiles
 from shoal.mechanics.simulate import simulate
 from shoal.scene import Scene, load_scene
 
+USUAL = ("dop853", "leapfrog")
+"""Integrators that `auto` chooses for most machines: their kernels in space are compiled ahead, those of others when
+they are first used."""
+
 
 class Kernel(NamedTuple):
     """A kernel by its name, and the types of its arguments."""
@@ -56,19 +60,26 @@ class Kernel(NamedTuple):
 def warm(integrators: Iterable[str] = tuple(INTEGRATORS), note: Note = lambda _: None, *, every: bool = True) -> float:
     """Compile kernels that the cache lacks, on all cores, and load them; return the time [s].
 
-    every: for any scene, with constraints and all families of elements; else for cables that hang together. The first
-    integrator comes with the kernels of the mechanics, which the others share. `note` takes lines of progress.
+    every: for any scene, with constraints and all families of elements, for usual integrators in space too; else for
+    planar cables that hang together. The first integrator comes with the kernels of the mechanics, which the others
+    share. `note` takes lines of progress.
     """
     begin = time.perf_counter()
     first, *others = integrators
     for names in ([first], others):
-        scenes = [(_pendulum(name), lanes) for name in names for lanes in _lanes(name)]
-        ahead([kernel for scene, lanes in scenes for kernel in required(scene, lanes, every=every)], note)
+        wanted = [
+            kernel
+            for name in names
+            for scene in _machines(name, every=every)
+            for lanes in _lanes(name)
+            for kernel in required(scene, lanes, every=every)
+        ]
+        ahead(wanted, note)
     with reporting_to(note):  # what is small
         for name in (first, *others):
-            for lanes in _lanes(name):
+            for scene, lanes in itertools.product(_machines(name, every=every), _lanes(name)):
                 angles = {"initial.OA.angle": np.linspace(0.7, 0.8, lanes)} if lanes > 1 else None
-                simulate(_pendulum(name), np.array([4e-4]), angles)
+                simulate(scene, np.array([4e-4]), angles)
     return time.perf_counter() - begin
 
 
@@ -158,8 +169,12 @@ def _lanes(name: str) -> tuple[int, ...]:
     return (1, 2) if facts(name).warm_lanes else (1,)
 
 
-def _pendulum(integrator: str) -> Scene:
-    return load_scene("flexible-double-pendulum").with_values({"solver.integrator": integrator, "solver.step": 2e-4})
+def _machines(integrator: str, *, every: bool) -> list[Scene]:
+    """Return a planar machine, and for usual integrators a spatial one, to compile the kernels of an integrator for."""
+    names = ["flexible-double-pendulum"]
+    if every and integrator in USUAL:
+        names.append("flexible-spherical-double-pendulum")
+    return [load_scene(name).with_values({"solver.integrator": integrator, "solver.step": 2e-4}) for name in names]
 
 
 if __name__ == "__main__":
