@@ -48,36 +48,21 @@ def enter(m: Arrays, w: Work) -> None:
 def force(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, f: Array) -> None:
     """All of `dynamics.force`."""
     t = instant(w, t)
-    call(
-        m.table.motion,
-        (tile, pointer_to(m.storage, m), pointer_to(w.storage, w), t, z, zdot, 0.0, f, ALL),
-    )
+    call(m.table.motion, (tile, pointer_to(m.storage, m), pointer_to(w.storage, w), t, z, zdot, 0.0, f, ALL))
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def elastic_force(tile: Tile, m: Arrays, w: Work, z: Array, f: Array, exact: bool) -> None:
     """The elastic part of `dynamics.force`; exact: without the elements of `dynamics.add_mean_force`."""
     part = SIMPLE if exact else ELASTIC
-    call(
-        m.table.motion,
-        (tile, pointer_to(m.storage, m), pointer_to(w.storage, w), 0.0, z, z, 0.0, f, part),
-    )
+    call(m.table.motion, (tile, pointer_to(m.storage, m), pointer_to(w.storage, w), 0.0, z, z, 0.0, f, part))
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def acceleration(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, tolerance: float, a: Array) -> None:
     """All of `dynamics.force`, then `dynamics.accelerate`; z, zdot, a: (rows, lanes)."""
     t = instant(w, t)
-    arguments = (
-        pointer_to(m.storage, m),
-        pointer_to(w.storage, w),
-        t,
-        z,
-        zdot,
-        tolerance,
-        a,
-        ACCELERATION,
-    )
+    arguments = (pointer_to(m.storage, m), pointer_to(w.storage, w), t, z, zdot, tolerance, a, ACCELERATION)
     call(m.table.motion, (tile, *arguments))
 
 
@@ -104,24 +89,14 @@ def settle(
     if m.constraints.size > 0 and m.projects:
         t = instant(w, t)
         ready = found and m.table.sought == 0 and m.method == PROJECTION
-        arguments = (
-            pointer_to(m.storage, m),
-            pointer_to(w.storage, w),
-            t,
-            tolerance,
-            iterations,
-            ready,
-        )
+        arguments = (pointer_to(m.storage, m), pointer_to(w.storage, w), t, tolerance, iterations, ready)
         call(m.table.settle, (tile, *arguments))
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def meet(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float) -> None:
     """Let driven constraints take up their new rates at once: a plastic impact, the least change in the mass metric."""
-    call(
-        m.table.settle,
-        (tile, pointer_to(m.storage, m), pointer_to(w.storage, w), t, tolerance, 3, False),
-    )
+    call(m.table.settle, (tile, pointer_to(m.storage, m), pointer_to(w.storage, w), t, tolerance, 3, False))
 
 
 @njit(cache=True, error_model="numpy")
