@@ -110,7 +110,7 @@ def test_a_sum_of_heavy_tails(seed: int) -> None:
 
 @pytest.mark.slow
 def test_intervals_of_sums_hold_as_often_as_they_say() -> None:
-    """At least 93 % of those that are not in doubt, and few of them are: 16 where this was measured, 98 of 104 held."""
+    """At least 93 % of those that are not in doubt, and few of them are."""
     held = doubted = 0
     for seed in range(120):
         of, exact = drawn(100 + seed)
@@ -119,4 +119,4 @@ def test_intervals_of_sums_hold_as_often_as_they_say() -> None:
         doubted += bool(found.doubt)
         held += not found.doubt and lower <= exact <= upper
     assert held >= 0.93 * (120 - doubted)
-    assert doubted <= 24
+    assert doubted <= 12
