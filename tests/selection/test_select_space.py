@@ -100,6 +100,17 @@ def test_a_curved_and_twisted_rod_keeps_its_word_against_exudyns_beams(
     assert np.max(np.linalg.norm(found.trajectory.marker("e") - exudyn, axis=1)) < tolerance
 
 
+@pytest.mark.parametrize("tolerance", [1e-2, 2e-4])
+def test_shear_that_no_rod_in_space_has_counts(tolerance: float) -> None:
+    """Let go under its weight, a thick cantilever sags by shear too: Timoshenko (1921), kappa by Cowper (1966)."""
+    found = select(clamped(height=0.15, width=0.15, youngs_modulus=2e7), tolerance)
+    shear = 2 * np.hypot(GRAVITY, GRAVITY) * RHO / 2 / (10 * 1.3 / (12 + 11 * 0.3) * 2e7 / 2.6)
+    assert found.chosen.error <= tolerance
+    assert shear / 5 < found.shear < 5 * shear
+    assert found.met == found.trajectory.ok == (tolerance == 1e-2)
+    assert found.met == ((found.errors.total or 0.0) <= tolerance)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-3])
 def test_the_swinging_strip_comes_within_the_tolerance_of_exudyns_limit(tolerance: float) -> None:

@@ -70,7 +70,7 @@ def coarse_to_fine(
     # Values of different models cannot be compared, so the search on the coarse one counts without a best value.
     fine.counter.charge(coarse.counter.evaluations, outcome.point, np.inf)
     rows = outcome.iterations + [(len(outcome.iterations) + i, best, mean) for i, best, mean in rows]
-    message = "" if chosen.met else f"the model is off by about {chosen.chosen.error:.1g} m: {chosen.reason}"
+    message = "" if chosen.met else f"the model is off, {chosen.errors.brief}: {chosen.reason}"
     return fine, replace(outcome, point=point, fitness=fitness, iterations=rows, message=message), stages
 
 

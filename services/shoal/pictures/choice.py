@@ -6,8 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shoal.pictures.numbers import length
-
 if TYPE_CHECKING:
     from shoal.selection import Selection
     from shoal.trajectory import Trajectory
@@ -23,8 +21,6 @@ def why(found: Selection) -> list[str]:
     taken = found.chosen.name if found.met else "none"
     reasons = [f"Of {len(found.candidates)} models, {taken} was taken: {found.reason}."]
     reasons += [f"{rod} stays rigid: {reason}." for rod, reason in found.rigid.items()]
-    if found.shear > found.tolerance:
-        reasons.append(f"Shear and rotary inertia, which the beams leave out, are worth about {length(found.shear)}.")
     return reasons
 
 

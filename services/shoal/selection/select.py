@@ -17,9 +17,9 @@ from shoal.error_budget import ErrorBudget
 from shoal.errors import ComputationError, InputError
 from shoal.scene import Rod, Scene
 from shoal.selection.coarsen import WITHIN, coarsen
-from shoal.selection.levels import SHEARS, SLENDER, Levels, open_rods
+from shoal.selection.levels import RIGID, SHEARS, SLENDER, STOUT, Levels, apply, open_rods
 from shoal.selection.prior import Prior, estimate
-from shoal.selection.refine import PATIENCE, REFERENCE, Progress, Runs, refine, settled
+from shoal.selection.refine import AGREE, PATIENCE, REFERENCE, Progress, Reference, Runs, refine, settled
 from shoal.selection.run import Candidate, distance, fewest, rigid_scene, run
 from shoal.selection.strain_limits import excessive_torques
 from shoal.trajectory import Array, Status, Trajectory, plain
@@ -43,10 +43,10 @@ MORE_STEPS = 1.25
 class Selection:
     """The chosen model and how it was found.
 
-    chosen: its scene reproduces the run; trajectory: at the requested times; met: whether its estimated error is
-    within the tolerance [m]; candidates: every run, in order; priors: a priori estimates; rigid: rods that stay rigid
-    and why; limits: the element whose limit is the truth of each rod; shear: neglected by the theory of the beam, by
-    order of magnitude [m]; wall_s: of all runs
+    chosen: its scene reproduces the run; trajectory: at the requested times; met: whether the sum of its known errors,
+    that of the theory among them, is within the tolerance [m]; candidates: every run, in order; priors: a priori
+    estimates; rigid: rods that stay rigid and why; limits: the element whose limit is the truth of each rod; shear:
+    neglected by the theory of the beam, by order of magnitude [m]; wall_s: of all runs
     """
 
     tolerance: float
@@ -64,8 +64,7 @@ class Selection:
     @property
     def errors(self) -> ErrorBudget:
         """Return the errors of the chosen model at the markers [m]: of its steps and mesh, and of its theory."""
-        model = self.chosen.error if np.isfinite(self.chosen.error) else None
-        return ErrorBudget({"model": model, **({"theory": self.shear} if self.shear else {})})
+        return _budget(self.chosen, self.shear)
 
     def to_json(self) -> dict[str, Any]:
         """Return the object that `shoal simulate --tolerance --json` prints below `selection`."""
@@ -84,6 +83,12 @@ class Selection:
             "wall_s": self.wall_s,
         }
         return dict(plain(data))
+
+
+def _budget(chosen: Candidate, shear: float) -> ErrorBudget:
+    """Return `Selection.errors`, whose sum decides whether the tolerance is met."""
+    model = chosen.error if np.isfinite(chosen.error) else None
+    return ErrorBudget({"model": model, **({"theory": shear} if shear else {})})
 
 
 def _candidate_json(candidate: Candidate, chosen: bool) -> dict[str, Any]:
@@ -110,13 +115,15 @@ def select(
     meshed: Collection[str] = (),
     coarsened: bool = True,
 ) -> Selection:
-    """Return the cheapest model of a scene whose estimated error at the markers is within `tolerance` [m].
+    """Return the cheapest model of a scene whose known errors at the markers sum to at most `tolerance` [m].
 
-    The truth is the converged theory of rods with a modulus, independent of the element that the scene names:
-    Bernoulli-Euler's beam; in the plane Simo and Reissner's rod where shear and rotary inertia are estimated at more
-    than a tenth of the tolerance, or where meshes of the former do not converge, unless torques fold rods (see
-    `excessive_torques`) or with `solver.theory: slender`. The elements ancf-full, simo-reissner and director-rod are
-    theories of their own; a rigid rod in space is taken to twist as well as to bend.
+    The error of a model is its distance from the converged theory of rods with a modulus, independent of the element
+    that the scene names, and what that theory neglects. The theory is Bernoulli-Euler's beam. Where the shear and
+    rotary inertia that it neglects are estimated at more than a tenth of the tolerance, or where its meshes do not
+    converge, it is Simo and Reissner's rod in the plane, and rods that stay rigid have the rotary inertia of their
+    sections; but not where torques fold rods (see `excessive_torques`) or with `solver.theory: slender`. The elements
+    ancf-full, simo-reissner and director-rod are theories of their own; a rigid rod in space is taken to twist as well
+    as to bend.
     Integrator, step, element and number of elements are chosen; `progress` gets a line for every model that is run.
     patience: the answer is "not met" where a refinement would take longer [s]; meshed: rods that have to be made of
     elements, as the strains of their sections are asked for; coarsened: whether a cheaper model than the finest is
@@ -132,15 +139,18 @@ def select(
     limits, closed, counts = _open(scene)
     priors = estimate(scene, tuple(limits)) if limits else {}
     task = _Task(scene, tolerance, asked, priors, closed, progress, patience, meshed, counts, coarsened)
-    may_shear = scene.dimensions == 2 and scene.solver.theory == "auto" and SLENDER in limits.values()
+    auto = scene.solver.theory == "auto"
+    may_shear = auto and scene.dimensions == 2 and SLENDER in limits.values()
     found = _of_theory(task, limits, another=may_shear)
     beyond = excessive_torques(scene, limits) if may_shear and not found.met else ""
     if beyond:
         reason = f"{beyond}; slender rods: {found.reason}"
-        found = replace(found, reason=reason, trajectory=_rejected(found.trajectory, found.chosen.error, reason))
-    elif may_shear and (not found.met or found.shear > COUNTS_FROM * tolerance):
-        shearing = {rod: SHEARS if limit == SLENDER else limit for rod, limit in limits.items()}
-        found = _of_both(found, _of_theory(task, shearing))
+        found = replace(found, reason=reason, trajectory=_rejected(found.trajectory, found.errors, reason))
+    elif (may_shear and not found.met) or (
+        auto and found.shear > COUNTS_FROM * tolerance and (may_shear or _stout(scene, found.rigid) != scene)
+    ):
+        shearing = {rod: SHEARS if may_shear and limit == SLENDER else limit for rod, limit in limits.items()}
+        found = _of_both(found, _of_theory(task._replace(scene=_stout(scene, closed)), shearing, stout=True))
     model = {**found.trajectory.model, "errors": found.errors.to_json()}
     return replace(found, trajectory=replace(found.trajectory, model=model), wall_s=clock.now() - begin)
 
@@ -167,50 +177,81 @@ def _of_both(slender: Selection, shearing: Selection) -> Selection:
     """Choose between theories where that of slender rods neglects too much, or its meshes do not converge."""
     candidates = [*slender.candidates, *shearing.candidates]
     if shearing.met:
-        why = f"shear and rotary inertia, worth about {slender.shear:.1g} m, count; " if slender.met else ""
+        counts = slender.shear > COUNTS_FROM * slender.tolerance
+        why = f"shear and rotary inertia, worth about {slender.shear:.1g} m, count; " if counts else ""
         return replace(shearing, candidates=candidates, reason=why + shearing.reason)
     if not slender.met:
-        nearer = shearing if shearing.chosen.error < slender.chosen.error else slender
+        nearer = shearing if _error(shearing) < _error(slender) else slender
         reason = f"slender rods: {slender.reason}; with shear and rotary inertia: {shearing.reason}"
-        rejected = _rejected(nearer.trajectory, nearer.chosen.error, reason)
+        rejected = _rejected(nearer.trajectory, nearer.errors, reason)
         return replace(nearer, candidates=candidates, reason=reason, trajectory=rejected)
     reason = f"slender rods leave out about {slender.shear:.1g} m, and with shear and rotary inertia {shearing.reason}"
-    slender.chosen.error += slender.shear / COUNTS_FROM
-    trajectory = _rejected(slender.trajectory, slender.chosen.error, reason)
-    return replace(slender, candidates=candidates, met=False, reason=reason, trajectory=trajectory)
+    rough = replace(slender, shear=slender.shear / COUNTS_FROM)  # known roughly, and nothing confirms it
+    trajectory = _rejected(slender.trajectory, rough.errors, reason)
+    return replace(rough, candidates=candidates, met=False, reason=reason, trajectory=trajectory)
 
 
-def _of_theory(task: _Task, limits: Mapping[str, str], another: bool = False) -> Selection:
+def _error(found: Selection) -> float:
+    """Return the sum of the known errors of a model [m]; infinite where that of its mesh is unknown."""
+    return np.inf if found.errors.unknown else found.errors.total or 0.0
+
+
+def _stout(scene: Scene, rods: Collection[str]) -> Scene:
+    """Return the scene with these rods rigid, and with the rotary inertia of their sections."""
+    return apply(scene, dict.fromkeys(rods, STOUT))
+
+
+def _of_theory(task: _Task, limits: Mapping[str, str], another: bool = False, stout: bool = False) -> Selection:
     """Return the cheapest model where the truth of each rod is the limit of that element.
 
-    another: whether a richer theory remains; see `refine`
+    another: whether a richer theory remains; see `refine`; stout: whether rods that stay rigid have rotary inertia
     """
     tolerance, priors, grid = task.tolerance, task.priors, _grid(task.asked)
     unmoved = [rod for rod, prior in priors.items() if prior.error * SURELY_RIGID * len(limits) < tolerance]
     surely = [rod for rod in unmoved if rod not in task.meshed]
     closed = task.closed | {rod: f"would move the markers by about {priors[rod].error:.1g} m" for rod in surely}
     runs = Runs(task.scene, grid, limits, task.progress, task.patience, task.meshed, task.fewest)
-    fixed = runs.coarsest
+    fixed = {
+        rod: replace(level, rotary=level.rotary or (stout and level == RIGID)) for rod, level in runs.coarsest.items()
+    }
     flexible = tuple(rod for rod in limits if rod not in surely)
     known = sum(priors[rod].error for rod in surely)
     if flexible:
         worst = SURELY_RIGID * sum(prior.error for prior in priors.values())
-        chosen, reason = _flexible(runs, flexible, fixed, task, known, worst, another)
+        chosen, reason, theory = _flexible(runs, flexible, fixed, task, known, worst, another)
     else:
         chosen, reason = _rigid(runs, fixed, tolerance, known)
-    met = bool(chosen.error <= tolerance)
+        theory = chosen
+        within = _for_mesh(tolerance, chosen, known)
+        if not another and chosen.error > within:
+            chosen, reason = _rigid(runs, fixed, within, known)
+    shear = _shear(theory)
+    errors = _budget(chosen, shear)
+    met = not errors.unknown and (errors.total or 0.0) <= tolerance
+    if not met and chosen.error <= tolerance:
+        reason = f"shear and rotary inertia that the rods leave out are worth about {shear:.1g} m; {reason}"
     return Selection(
         tolerance=tolerance,
         met=met,
         reason=reason,
         chosen=chosen,
-        trajectory=_at(chosen, grid, task.asked, met, reason),
+        trajectory=_at(chosen, grid, task.asked, errors, met, reason),
         candidates=runs.candidates,
         priors=priors,
         rigid=closed,
         limits=dict(limits),
-        shear=_shear(chosen),
+        shear=shear,
     )
+
+
+def _for_mesh(tolerance: float, chosen: Candidate, known: float) -> float:
+    """Return the part of the tolerance [m] that the theory of the rods leaves to mesh and steps.
+
+    All of it where the theory alone neglects more: the answer is not met, but its mesh and steps are as accurate as
+    was asked for.
+    """
+    left = tolerance - _shear(chosen)
+    return left if left > known else tolerance
 
 
 def _shear(chosen: Candidate, share: Callable[..., float] = max) -> float:
@@ -278,31 +319,39 @@ def _flexible(
     known: float,
     worst: float,
     another: bool,
-) -> tuple[Candidate, str]:
+) -> tuple[Candidate, str, Candidate]:
     """Refine to a reference, then coarsen, unless a richer theory remains and what this one neglects counts.
 
+    Return the chosen model, the reason, and the finest, which shows best what the theory neglects.
+
+    What the theory neglects leaves the mesh that much less of the tolerance; see `_for_mesh`.
     worst: a priori error of rigid rods, where nothing better is known [m]
     """
-    reference = refine(runs, rods, fixed, task.tolerance - known, another)
+    within, reference = task.tolerance, refine(runs, rods, fixed, task.tolerance - known, another)
+    if not another and isinstance(reference, Reference):
+        within = _for_mesh(task.tolerance, reference.candidate, known)
+        if reference.error > AGREE * (within - known):
+            reference = refine(runs, rods, fixed, within - known)
     if isinstance(reference, str):
         refined = [candidate for candidate in runs.candidates if candidate.role == REFERENCE]
         if len(refined) < 2:
-            if any(level.element != "rigid" for level in runs.coarsest.values()):
+            if any(level.element != "rigid" for level in fixed.values()):
                 raise ComputationError(f"{reference}; state numbers of elements instead of a tolerance")
-            stiff, _ = _rigid(runs, runs.coarsest, task.tolerance, worst)
-            return stiff, reference
+            stiff, _ = _rigid(runs, fixed, task.tolerance, worst)
+            return stiff, reference, stiff
         left, why = settled(refined)
         refined[-1].error = left + known
-        return refined[-1], why if refined[-1].error <= task.tolerance else reference
+        return refined[-1], why if refined[-1].error <= within else reference, refined[-1]
     reference.error += known
     beyond = f"; but {reference.candidate.excess}" if reference.candidate.excess else ""
     if not task.coarsened or (another and _shear(reference.candidate, min) > COUNTS_FROM * task.tolerance):
         reference.candidate.error = reference.error
-        return reference.candidate, f"the finest model{beyond}"
-    chosen = coarsen(runs, reference, rods, task.tolerance)
+        return reference.candidate, f"the finest model{beyond}", reference.candidate
+    chosen = coarsen(runs, reference, rods, within)
     if chosen is None:
-        return reference.candidate, f"no model that was run is within the tolerance{beyond}"
-    return chosen, f"the reference, {reference.candidate.name}, is {chosen.error - reference.error:.1g} m away{beyond}"
+        return reference.candidate, f"no model that was run is within the tolerance{beyond}", reference.candidate
+    away = chosen.error - reference.error
+    return chosen, f"the reference, {reference.candidate.name}, is {away:.1g} m away{beyond}", reference.candidate
 
 
 def _grid(asked: Array) -> Array:
@@ -313,16 +362,16 @@ def _grid(asked: Array) -> Array:
     return np.asarray(values[keep])
 
 
-def _at(candidate: Candidate, grid: Array, asked: Array, met: bool, reason: str) -> Trajectory:
+def _at(candidate: Candidate, grid: Array, asked: Array, errors: ErrorBudget, met: bool, reason: str) -> Trajectory:
     """Return the run at the requested times; failed unless it meets the tolerance."""
     index = [int(np.argmin(np.abs(grid - t))) for t in asked]
     run = candidate.trajectory
     found = replace(run, times=asked, points=run.points[index], angles=run.angles[index])
-    return _rejected(found, candidate.error, reason) if run.ok and not met else found
+    return _rejected(found, errors, reason) if run.ok and not met else found
 
 
-def _rejected(run: Trajectory, error: float, reason: str) -> Trajectory:
-    """Return a run marked as failed, as its error [m] exceeds the tolerance; a rejected run keeps its status."""
-    if not np.isfinite(error):
+def _rejected(run: Trajectory, errors: ErrorBudget, reason: str) -> Trajectory:
+    """Return a run marked as failed, as its errors exceed the tolerance; a rejected run keeps its status."""
+    if errors.unknown or errors.total is None:
         return replace(run, message=reason)
-    return replace(run, status=(Status.FAILED,), message=f"tolerance not met, estimated error {error:.2g} m: {reason}")
+    return replace(run, status=(Status.FAILED,), message=f"tolerance not met, {errors.brief}: {reason}")
