@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -55,9 +55,7 @@ class Ended(Mapping[str, Any]):
                 vectors=tuple(tuple(one.at(self.q).tolist()) for one in vectors),
                 rates=tuple(tuple(one.rate(self.v).tolist()) for one in vectors),
             )
-        turns: dict[str, tuple[float, ...]] = {}
-        for name, number in counting(self.model):
-            turns[name] = (*turns.get(name, ()), float(self.turns[number]))
+        turns = named_turns(self.model, self.turns)
         angles = dict(zip(scene.markers, self.angles.tolist(), strict=True))
         return End.model_construct(t=self.time, bodies=bodies, turns=turns, angles=angles).model_dump(mode="json")
 
@@ -66,8 +64,30 @@ class Ended(Mapping[str, Any]):
         return dict, (self._told,)
 
 
-def counting(model: Model) -> list[tuple[str, int]]:
-    """The force elements of a model that count turns: the name of the joint or the load, and the element's number."""
+def named_turns(model: Model, turns: Array) -> dict[str, tuple[float, ...]]:
+    """Return the angles [rad] that force elements have counted, (forces,), by the name of their joint or load."""
+    named: dict[str, tuple[float, ...]] = {}
+    for name, number in _counting(model):
+        named[name] = (*named.get(name, ()), float(turns[number]))
+    return named
+
+
+def start_angles(model: Model, named: Sequence[Mapping[str, Sequence[float]]]) -> Array:
+    """Return the angles [rad] with which force elements start, (forces, lanes), from those of each lane by name.
+
+    Elements that have no name there, such as friction that only other lanes have, keep the angles of the model.
+    """
+    angles = np.tile(model.start_angles, len(named) // model.start_angles.shape[1])
+    counting = _counting(model)
+    for lane, turns in enumerate(named):
+        left = {name: iter(of_name) for name, of_name in turns.items()}
+        for name, number in counting:
+            angles[number, lane] = next(left.get(name, iter(())), angles[number, lane])
+    return angles
+
+
+def _counting(model: Model) -> list[tuple[str, int]]:
+    """Return the force elements that count turns: the name of the joint or the load, and the element's number."""
     numbers = np.flatnonzero(model.forces.kind == ANGLE)
     if not numbers.size:
         return []

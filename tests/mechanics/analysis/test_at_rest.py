@@ -178,6 +178,31 @@ def test_every_lane_has_its_own_place_of_rest() -> None:
         assert run.marker("tip", lane) == pytest.approx(np.tile(bent, (2, 1)), abs=1e-9)
 
 
+def test_lanes_without_friction_stay_at_rest_beside_those_with_it() -> None:
+    """A lane that has no friction has fewer force elements: the turns of its spring are those of the spring."""
+    hinge = {"first": {"body": "ground", "point": [0.0, 0.0]}, "second": {"body": "arm"}, "friction": 0.1}
+    coil = {"kind": "torsion-spring", "first": {"body": "ground", "point": [0.0, 0.0]}, "second": {"body": "arm"},
+            "stiffness": 5.0, "angle": 7.0}  # fmt: skip
+    scene = Scene.parse(
+        {
+            "name": "wound",
+            "bodies": {"arm": {"kind": "rod", "length": 0.5, "height": 0.01, "width": 0.01, "density": 2700.0}},
+            "joints": {"hinge": hinge},
+            "loads": {"coil": coil},
+            "markers": {"tip": {"body": "arm", "point": "end"}},
+            "initial": {"from": "statics", "arm": {"angle": 6.0}},
+            "solver": {"duration": 0.2},
+        }
+    )
+    weight, length = 9.81 * 2700.0 * 0.01**2 * 0.5, 0.5
+    angle = brentq(lambda a: 5.0 * (7.0 - a) - weight * length / 2 * np.cos(a), 6.0, 7.5)
+    run = get_engine("gauss").simulate_many(scene, {"joints.hinge.friction": np.array([0.0, 0.1])}, [0.0, 0.2])
+    assert run.ok, run.message
+    for lane in range(2):
+        known = length * np.array([np.cos(angle), np.sin(angle)])
+        assert run.marker("tip", lane) == pytest.approx(np.tile(known, (2, 1)), abs=1e-8)
+
+
 def test_states_along_the_motion_begin_there_too() -> None:
     scene = blade(force=5.0)
     (state,) = states(scene, [0.05])[1]

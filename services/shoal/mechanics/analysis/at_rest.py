@@ -8,8 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from shoal.errors import InputError
+from shoal.mechanics.analysis.equilibrium import Equilibrium
 from shoal.mechanics.analysis.going_on import taken_up
 from shoal.mechanics.analysis.statics import statics
+from shoal.mechanics.ended import start_angles
 from shoal.mechanics.model import Model
 from shoal.scene import Scene
 from shoal.scene.ended import End
@@ -26,13 +28,13 @@ def begun(model: Model, scenes: Sequence[Scene] | None = None) -> Model:
     if not model.stated.starts_at_rest:
         return model
     found = [_equilibrium(scene) for scene in scenes or [model.stated]]
-    places, turns = (np.stack(columns, axis=1) for columns in zip(*found, strict=True))
-    return replace(model, q0=places, v0=np.zeros_like(places), start_angles=turns, shared_tiles={})
+    places = np.stack([one.q for one in found], axis=1)
+    angles = start_angles(model, [one.turns for one in found])
+    return replace(model, q0=places, v0=np.zeros_like(places), start_angles=angles, shared_tiles={})
 
 
-def _equilibrium(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
-    """Coordinates and the angles that angle forces have counted."""
+def _equilibrium(scene: Scene) -> Equilibrium:
     found = statics(scene)
     if not found.ok:
         raise InputError(f"initial.from: statics finds no stable place of rest: {found.message}")
-    return found.q, found.turns
+    return found

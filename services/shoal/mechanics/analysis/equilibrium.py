@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
@@ -38,7 +39,7 @@ class Equilibrium:
     relative to all forces; gap: worst violation of a joint; correction: the last one, relative to the machine's size.
     eigenvalues: of the reduced stiffness in the metric of the mass [rad^2/s^2], lowest first; all positive means
     stable, but where forces follow the motion; levels: below these each is zero to working accuracy. steps: load steps.
-    reactions: in the joints. turns: what angle forces have counted [rad].
+    reactions: in the joints. turns: angles [rad] that force elements have counted, by joint or load.
     mesh_error: how far the markers are from the limit of ever finer meshes [m], theory_error: from where rods with
     shear rest, each None where it is not known; not_estimated: sources whose error is of interest and not known;
     estimated: whether errors were looked for.
@@ -64,7 +65,7 @@ class Equilibrium:
     iterations: int
     steps: int
     reactions: Reactions | None
-    turns: Array = field(repr=False)
+    turns: Mapping[str, Sequence[float]] = field(repr=False)
     mesh_error: float | None = None
     theory_error: float | None = None
     not_estimated: tuple[str, ...] = ()

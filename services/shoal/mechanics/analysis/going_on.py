@@ -14,7 +14,7 @@ from shoal.errors import InputError
 from shoal.mechanics.affine import Affine
 from shoal.mechanics.analysis import triads
 from shoal.mechanics.analysis.evaluate import Evaluator
-from shoal.mechanics.ended import counting
+from shoal.mechanics.ended import start_angles
 from shoal.mechanics.frames import BeamFrame
 from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import Array
@@ -39,9 +39,7 @@ def taken_up(model: Model, state: End) -> Model:
     found = [_coordinates(model, state, vectors, lane) for lane in range(model.lanes if differ else 1)]
     q, v = (np.stack(columns, axis=1) for columns in zip(*found, strict=True))
     q, v = (np.broadcast_to(part, (model.unknowns, model.lanes)).copy() for part in (q, v))
-    angles, told = model.start_angles.copy(), {name: iter(turns) for name, turns in state.turns.items()}
-    for name, number in counting(model):
-        angles[number] = next(told.get(name, iter(())), angles[number])
+    angles = start_angles(model, [state.turns] * model.start_angles.shape[1])
     model = replace(model, q0=q, v0=v, start_angles=angles, shared_tiles={})
     for lane in range(model.lanes if model.varies else 1):
         _check_joints(model, lane)

@@ -28,6 +28,7 @@ from shoal.mechanics.analysis.steady import EXACT, NotSteadyError, Steady, stead
 from shoal.mechanics.analysis.whirl import whirls
 from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.assembly.placement import place
+from shoal.mechanics.ended import start_angles
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
 from shoal.scene import Scene
@@ -332,7 +333,7 @@ def modes_about(equilibrium: Equilibrium, *, count: int = 10) -> Modes:
     """The `count` lowest modes about an equilibrium. Raises ComputationError where it is singular."""
     scene, time = equilibrium.scene, equilibrium.time
     evaluator = Evaluator.of(scene, horizon=time)
-    evaluator.turns = equilibrium.turns
+    evaluator.turns = start_angles(evaluator.model, [equilibrium.turns])[:, 0]
     return _modes(scene, evaluator, equilibrium.q, time, count, "equilibrium", equilibrium.message)
 
 

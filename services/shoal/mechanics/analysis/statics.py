@@ -26,6 +26,7 @@ from shoal.mechanics.analysis.small_motions import LEAST, ROUND, TENSION, hides,
 from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.assembly.groups import start_angle
 from shoal.mechanics.assembly.placement import place
+from shoal.mechanics.ended import named_turns
 from shoal.mechanics.frames import BeamFrame, PointFrame, RigidFrame
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
@@ -223,7 +224,7 @@ class _Search:
             iterations=self.iterations,
             steps=self.steps,
             reactions=reactions,
-            turns=self.evaluator.turns,
+            turns=named_turns(self.evaluator.model, self.evaluator.turns),
         )
 
     def _assembled(self) -> Array:
