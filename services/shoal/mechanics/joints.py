@@ -49,6 +49,11 @@ class JointCondition:
     motion: of the free bodies, an `analysis.free_motion.FreeMotion`
     """
 
+    @property
+    def is_of_start(self) -> bool:
+        """Return whether it keeps a number, whatever it is, that the start has."""
+        return False
+
     def constrain(self, name: str, bodies: Any) -> None:
         """Add the residual terms, which vanish where the condition holds, to `bodies.terms`.
 
@@ -127,6 +132,11 @@ class Apart(JointCondition):
     second: Attachment
     length: Function | None
 
+    @property
+    def is_of_start(self) -> bool:
+        """Return whether it keeps the distance that the start has."""
+        return self.length is None
+
     def constrain(self, name: str, bodies: Any) -> None:
         """Require the length of the gap."""
         bodies.keep_distance(name, bodies.gap(bodies.scene, self), self.length)
@@ -188,6 +198,11 @@ class Geared(JointCondition):
     axes: tuple[Vector3, ...]
 
     @property
+    def is_of_start(self) -> bool:
+        """Return true: the sum is that of the start."""
+        return True
+
+    @property
     def factors(self) -> tuple[float, ...]:
         """Return the factors of the angles, the largest of them 1."""
         return tuple(count / self.most for count in self.teeth)
@@ -199,7 +214,12 @@ class Geared(JointCondition):
 
     def constrain(self, name: str, bodies: Any) -> None:
         """Require the weighted sum of the angles that the start has, but for whole teeth."""
-        bodies.keep_mesh(name, self)
+        turning = zip(self.factors, self.sides, self.axes, strict=True)
+        angles = [
+            (factor, bodies.angle(name, side, axis)) for factor, side, axis in turning if factor and side.body != GROUND
+        ]
+        if angles:
+            bodies.terms.mesh(name, angles, 2 * np.pi / self.most)
 
 
 @dataclass(frozen=True)

@@ -15,22 +15,26 @@ import numpy as np
 from shoal.mechanics.affine import Affine
 from shoal.mechanics.fitting import start_slope, start_value
 from shoal.mechanics.numerics.tile import Array, Index
-from shoal.mechanics.terms import Mesh, Term
+from shoal.mechanics.terms import Term
 
 
 class TermValues:
-    """Terms as arrays. roots: numbers of the terms u' u of which the root is asked for, a length."""
+    """Terms as arrays. roots: numbers of the terms u' u of which the root is asked for, a length.
 
-    def __init__(self, terms: Sequence[Term | Mesh], dimensions: int, roots: Sequence[int] = ()) -> None:
-        self.count = len(terms)
-        products = [(row, one) for row, one in enumerate(terms) if isinstance(one, Term)]
-        angles = [(row, *part) for row, one in enumerate(terms) if isinstance(one, Mesh) for part in one.parts]
+    counted: whether the vectors of angles have the angle itself as their first component, with all turns
+    """
+
+    def __init__(
+        self, terms: Sequence[Term], dimensions: int, roots: Sequence[int] = (), counted: bool = False
+    ) -> None:
+        self.count, self._counted = len(terms), counted
+        products = [(row, one) for row, one in enumerate(terms) if one.has_product]
+        angles = [(row, *part) for row, one in enumerate(terms) for part in one.angles]
         vectors = [(row, vector) for name in "uw" for row, one in products for vector in (getattr(one, name),)]
         vectors += [(row, vector) for row, _, vector in angles]
         self._products = _index([row for row, _ in products])
-        self._factors = np.zeros((len(angles), len(terms)))  # of angles in the terms
-        for factors, (row, factor, _) in zip(self._factors, angles, strict=True):
-            factors[row] = factor
+        self._angled = np.array([[row == one for one in range(len(terms))] for row, *_ in angles], dtype=float)
+        self._factors = laned([np.atleast_1d(factor) for _, factor, _ in angles], ())
         self._form = np.array([one.form for _, one in products]).reshape(-1, dimensions, dimensions)
         self._roots = np.isin(self._products, _index(roots))
         self._constant = laned([vector.constant.T for _, vector in vectors], (dimensions,))
@@ -46,14 +50,15 @@ class TermValues:
     def of_lane(self, lane: int) -> TermValues:
         """Return the terms of one lane."""
         other = copy(self)
-        for name in ("_constant", "offset", "_coefficients"):
+        for name in ("_constant", "offset", "_coefficients", "_factors"):
             setattr(other, name, one_lane(getattr(self, name), lane))
         return other
 
     def at(self, q: Array) -> tuple[Array, Array]:
         """Return the values, and the parts of the Jacobian, (lanes, parts), which add up."""
         count = len(self._products)
-        lanes = max(len(q), len(self._constant), len(self.offset), len(self._coefficients))
+        each = (q, self._constant, self.offset, self._coefficients, self._factors)
+        lanes = max(map(len, each))
         vectors = np.repeat(self._constant, lanes // len(self._constant), axis=0)
         steps = self._coefficients * q[:, self.unknowns, None]
         for part in self.groups:
@@ -71,10 +76,11 @@ class TermValues:
         values = np.zeros((lanes, self.count))
         values[:, self._products] = found
         by_turned = np.zeros_like(turned)
-        if len(self._factors):
+        if len(self._angled):
             x, y = turned[..., 0], turned[..., 1]
-            values = values + np.arctan2(y, x) @ self._factors
-            by_turned[..., 0], by_turned[..., 1] = np.sum(self._factors, axis=1) * np.stack([-y, x]) / (x * x + y * y)
+            values = values + (self._factors * (x if self._counted else np.arctan2(y, x))) @ self._angled
+            slope = np.stack([np.ones_like(x), 0.0 * y]) if self._counted else np.stack([-y, x]) / (x * x + y * y)
+            by_turned[..., 0], by_turned[..., 1] = self._factors * slope
         by_vector = np.concatenate([by_u, by_w, by_turned], axis=1)
         return values + self.offset, np.sum(by_vector[:, self._numbers] * self._coefficients, axis=2)
 

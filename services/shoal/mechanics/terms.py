@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
@@ -23,9 +23,11 @@ ROUND_OFF = 1e-12
 
 @dataclass(frozen=True)
 class Term:
-    """One constraint before it has rows: u' form w, plus a constant and a function of time.
+    """One constraint before it has rows: u' form w + sum of factor * angle + a constant and a function of time.
 
-    form: (d, d). lengths: the power of a length that it is measured in.
+    form: (d, d). lengths: the power of a length that it is measured in. angles: factors and unit vectors whose angles
+    [rad] are counted, in space in coordinates whose third axis is that which they turn about. period: of a term with
+    angles, multiples of which make no difference. of_start: whether the constant is such that it vanishes at the start
     """
 
     name: str
@@ -35,9 +37,19 @@ class Term:
     constant: Number
     drive: Composed | None
     lengths: int
+    angles: tuple[tuple[Number, Affine], ...] = ()
+    period: Number = 1.0
+    of_start: bool = False
+
+    @property
+    def has_product(self) -> bool:
+        """Return whether it is more than a sum of angles."""
+        return all(bool(vector.terms) or bool(np.any(vector.constant)) for vector in (self.u, self.w))
 
     def products(self, rows: Callable[[Affine], tuple[int, ...]]) -> list[tuple[int, int, Number, Affine, Affine]]:
         """(left row, right row, factor, left vector, right vector); left row -1 for a linear term."""
+        if not self.has_product:
+            return []
         u, w, form = self.u, self.w, self.form
         if not w.terms:
             u, w, form = w, u, form.T
@@ -50,6 +62,8 @@ class Term:
 
     def is_constant(self, size: float) -> bool:
         """Return whether every product of unknowns counts by round-off only. size: a length of the machine [m]."""
+        if self.angles:
+            return False
         small = ROUND_OFF * min(size**self.lengths, size ** (self.lengths - 1))
         one, other = ({CONSTANT: vector.constant, **vector.terms} for vector in (self.u, self.w))
         found: dict[frozenset[int], Number] = {}
@@ -58,41 +72,30 @@ class Term:
         found.pop(frozenset((CONSTANT,)))
         return all(np.all(np.abs(factor) <= small) for factor in found.values())
 
-
-@dataclass(frozen=True)
-class Mesh:
-    """Sum of factor * angle of unit vector + constant = 0, but for multiples of the period [rad].
-
-    In space the vectors are those of the body's turn in coordinates whose third axis is that which it turns about.
-    """
-
-    name: str
-    parts: tuple[tuple[float, Affine], ...]
-    constant: Number
-    period: float
-    drive: None = None
-    lengths: int = 0
-
     def slopes(self, rows: Callable[[Affine], tuple[int, ...]]) -> Iterator[tuple[int, int, Number]]:
-        """(unknown, row, coefficient): derivatives by an unknown are coefficients times rows, as d is a unit vector."""
-        for factor, vector in self.parts:
+        """(unknown, row, coefficient) of the angles: derivatives by an unknown are coefficients times rows, as their
+        vectors are of unit length.
+        """
+        for factor, vector in self.angles:
             if vector.terms:
                 x, y, *_ = rows(vector)
                 for unknown, (along, across, *_) in vector.terms.items():
                     yield unknown, y, -factor * along
                     yield unknown, x, factor * across
 
-    def begin(self, value: Callable[[Affine], Array]) -> Mesh:
+    def begin(self, value: Callable[[Affine], Array]) -> Term:
         """The same with the constant of a start; value: of a vector there, (d, lanes)."""
-        angles = (factor * plane.angle(value(vector)[:2]) for factor, vector in self.parts)
-        return replace(self, constant=-sum(angles, np.zeros(1)))
+        found = sum((factor * plane.angle(value(vector)[:2]) for factor, vector in self.angles), np.zeros(1))
+        if self.has_product:
+            found = found + np.einsum("il,ij,jl->l", value(self.u), self.form, value(self.w))
+        return replace(self, constant=-found)
 
 
 class Terms:
     """Collects constraints before their vectors have rows."""
 
     def __init__(self) -> None:
-        self.held: list[Term | Mesh] = []
+        self.held: list[Term] = []
         self.pressed: dict[str, tuple[int, int]] = {}
         """Joints whose force is asked for: the first of their constraints and how many they are."""
 
@@ -110,9 +113,26 @@ class Terms:
         """u x w + drive(t) = 0 of two vectors of the plane, measured in m to the power of `lengths`."""
         self.held.append(Term(name, u, w, plane.CROSS, 0.0, drive, lengths))
 
-    def mesh(self, name: str, parts: tuple[tuple[float, Affine], ...], constant: Number, period: float) -> None:
-        """Sum of factor * angle of unit vector + constant = 0, but for multiples of the period [rad]."""
-        self.held.append(Mesh(name, parts, constant, period))
+    def mesh(
+        self,
+        name: str,
+        angles: Iterable[tuple[Number, Affine]],
+        period: Number,
+        product: tuple[Affine, Affine] | None = None,
+        lengths: int = 0,
+    ) -> None:
+        """u . w + sum of factor * angle of unit vector stays as at the start, but for multiples of the period.
+
+        product: u and w, if any; lengths: the power of a length that it is measured in
+        """
+        angles = tuple(angles)
+        u, w = product or (fixed(0.0 * angles[0][1].constant),) * 2
+        form = np.eye(len(u.constant))
+        self.held.append(Term(name, u, w, form, 0.0, None, lengths, angles, period, of_start=True))
+
+    def begin(self, value: Callable[[Affine], Array]) -> None:
+        """Give all terms that vanish at the start their constants. value: of a vector there, (d, lanes)."""
+        self.held = [one.begin(value) if one.of_start else one for one in self.held]
 
     def settle(self, size: float) -> None:
         """Take the unknowns out of what does not depend on them; however small its slopes, they would count as a row.
@@ -120,7 +140,7 @@ class Terms:
         size: a length of the machine [m].
         """
         for k, held in enumerate(self.held):
-            if isinstance(held, Term) and held.is_constant(size):
+            if held.is_constant(size):
                 self.held[k] = replace(held, u=fixed(held.u.constant), w=fixed(held.w.constant))
 
     def press(self, name: str, condition: Any, before: int) -> None:
@@ -149,17 +169,16 @@ def assemble(terms: Terms, rows: Rows, driven: int, size: float) -> Constraints:
     turned, rising, shares, periods = [0], list[int](), list[Number](), list[Number]()
     for held in terms.held:
         found: dict[int, int] = {}
-        if isinstance(held, Mesh):
-            for unknown, source, coefficient in held.slopes(rows.of):
-                if np.any(coefficient):
-                    if unknown not in found:
-                        found[unknown] = len(column)
-                        column.append(unknown)
-                    parts.append((found[unknown], source, coefficient))
-            for share, vector in held.parts:
-                rising.append(rows.of(vector)[0])
-                shares.append(share)
-        for left, right, factor, u, w in held.products(rows.of) if isinstance(held, Term) else ():
+        for unknown, source, coefficient in held.slopes(rows.of):
+            if np.any(coefficient):
+                if unknown not in found:
+                    found[unknown] = len(column)
+                    column.append(unknown)
+                parts.append((found[unknown], source, coefficient))
+        for share, vector in held.angles:
+            rising.append(rows.of(vector)[0])
+            shares.append(share)
+        for left, right, factor, u, w in held.products(rows.of):
             lefts.append(left)
             rights.append(right)
             factors.append(factor)
@@ -178,7 +197,7 @@ def assemble(terms: Terms, rows: Rows, driven: int, size: float) -> Constraints:
         start.append(len(lefts))
         entry.append(len(column))
         turned.append(len(rising))
-        periods.append(held.period if isinstance(held, Mesh) else 1.0)
+        periods.append(held.period)
         drive.append(-1 if held.drive is None else driven)
         driven += held.drive is not None
 

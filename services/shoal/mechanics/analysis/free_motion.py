@@ -118,10 +118,7 @@ class FreeMotion:
         along: in the plane its angle in the body's frame [rad]; in space the axis as it points at the start, or that
         angle.
         """
-        if self.turn_axes == 1:
-            held = self.placement.direction(self.scene, first).turned(plane.rotation(along))
-            return self._everywhere(_unit(self.value(held)))
-        return self._everywhere(self.value(self._placement.line(first.body, along)))
+        return self._everywhere(_unit(self.value(self.placement.line(first, along))))
 
     def normals(self, line: Array) -> list[Array]:
         """Return the unit vectors at right angles to one, (samples, d) each: one in the plane, two in space."""
@@ -137,6 +134,10 @@ class FreeMotion:
         """Return an axis that two bodies have in common, as the rigid one has it, or else a section, (samples, 3)."""
         sides = sorted((first, second), key=lambda side: (self._is_rod(side.body), self.is_cable(side.body)))
         return self.axis(sides[0], axis)
+
+    def about(self, body: str, axis: Any) -> Array:
+        """Return the unit torque about an axis of a rigid body or the ground, (samples, components)."""
+        return self.turns["torque"] if self.turn_axes == 1 else self.held_axis(body, axis)
 
     def pin(self, joint: Revolute) -> Array:
         """Return the unit torque about the axis of a hinge, (samples, components)."""

@@ -102,8 +102,7 @@ def _geared(motion: FreeMotion, joint: str, condition: Geared) -> Component:
     gradient = np.zeros((len(motion.at), motion.bodies.unknowns))
     torques = []
     for side, axis, factor in zip(condition.sides, condition.axes, condition.factors, strict=True):
-        held = motion.turns["torque"] if motion.turn_axes == 1 else motion.held_axis(side.body, axis)
-        torques.append(factor * held)
+        torques.append(factor * motion.about(side.body, axis))
         gradient += _along(torques[-1], motion.turn(side))
     return Component(joint, "torque", gradient, np.zeros((len(motion.at), motion.dimensions)), torques[0])
 

@@ -13,7 +13,7 @@ from shoal.mechanics.affine import Affine, fixed
 from shoal.mechanics.assembly.groups import JointPoint, is_stiff, kept_rotation, place_of
 from shoal.mechanics.assembly.pose import Pose
 from shoal.mechanics.frames import BeamFrame, Frame
-from shoal.mechanics.joints import Along, Apart, Geared, InPlane, Meet, Turned
+from shoal.mechanics.joints import Along, Apart, InPlane, Meet, Turned
 from shoal.mechanics.numerics.tile import Array, Flags, Number
 from shoal.mechanics.reach import span
 from shoal.mechanics.terms import Terms
@@ -79,12 +79,20 @@ class Placement:
         """The way from the first place of a condition to the second."""
         return self.point(scene, condition.second) - self.point(scene, condition.first)
 
+    def line(self, first: Attachment, direction: Any) -> Affine:
+        """Return the unit vector of a line that a body holds. direction: see `across`."""
+        return self.direction(self.scene, first).turned(plane.rotation(direction))
+
+    def angle(self, name: str, side: Attachment, axis: Any) -> Affine:
+        """Return the unit vector of a body whose angle [rad] the joint `name` counts; axis: in space, about what."""
+        return self.direction(self.scene, side)
+
     def across(self, first: Attachment, direction: Any) -> list[tuple[Affine, Array]]:
         """Return vectors u and forms F with u' F w = 0 for w along a line that a body holds: one pair, in space two.
 
         direction: of the line in the body's frame [rad]; in space also an axis as it points at the start.
         """
-        return [(self.direction(self.scene, first).turned(plane.rotation(direction)), plane.CROSS)]
+        return [(self.line(first, direction), plane.CROSS)]
 
     def shares(self, condition: Any, is_weld: bool) -> bool:
         """Return whether the coordinates satisfy a condition by themselves, or further terms hold it.
@@ -128,14 +136,6 @@ class Placement:
             self.terms.cross(name, first, second, 0, condition.angle.through("sin", "neg"))
         else:
             self.terms.cross(name, first.turned(kept_rotation(self.scene, condition)), second, 0)
-
-    def keep_mesh(self, name: str, condition: Geared) -> None:
-        """Require the weighted sum of angles that the start has, but for whole teeth."""
-        directions = [self.direction(self.scene, side) for side in condition.sides]
-        starts = [plane.angle(self.start_of(one)[0]) for one in directions]
-        begin = sum(factor * angle for factor, angle in zip(condition.factors, starts, strict=True))
-        parts = tuple((factor, one) for factor, one in zip(condition.factors, directions, strict=True) if factor)
-        self.terms.mesh(name, parts, -begin, 2 * np.pi / condition.most)
 
     def make(self, point: JointPoint, position: Array, velocity: Array) -> Affine:
         """The coordinates of a joint point that has none yet."""

@@ -106,10 +106,7 @@ class Loads:
         if isinstance(joint, Revolute):
             self._angle(name, joint.first, joint.second, law, joint.axis)
             return
-        if isinstance(self.placement, SpatialPlacement):
-            line = self.placement.line(joint.first.body, joint.direction if joint.axis is None else joint.axis)
-        else:
-            line = self.placement.direction(self.scene, joint.first).turned(plane.rotation(joint.direction))
+        line = self.placement.line(joint.first, joint.direction if joint.axis is None else joint.axis)
         ends = [self.placement.point(self.scene, side) for side in (joint.first, joint.second)]
         self._measure(name, PLACE, [*ends, line], law, 0.0)
 

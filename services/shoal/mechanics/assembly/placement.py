@@ -70,6 +70,7 @@ def place(scene: Scene) -> Placement:
             joint, base, direction = point.line
             result.terms.cross(joint, fixed(direction), point.where - fixed(base), 1)
     hold(scene, result)
+    result.terms.begin(lambda vector: result.start_of(vector)[0])
     return result
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from shoal.mechanics import plane
 from shoal.mechanics.affine import Affine, fixed
 from shoal.mechanics.fitting import start_slope, start_value
-from shoal.mechanics.joints import Geared, Turned, of_scene
+from shoal.mechanics.joints import Turned, of_scene
 from shoal.mechanics.modal.modes import bent
 from shoal.mechanics.numerics.tile import Array, Flags, Index, Number
 from shoal.mechanics.plane import as_complex, phasor
@@ -60,11 +60,12 @@ class RigidBodies:
         self.marks: list[_Mark] = []
         self.lengths, self.wrapping = list[int](), list[int]()
         """Numbers of the terms that are lengths of vectors, and of those where whole turns make no difference."""
-        self.of_start: dict[int, Turned | Geared | None] = {}
-        """By number of the term, the conditions that take their value from the start; None: a distance."""
+        self.of_start: dict[int, Turned | None] = {}
+        """By number of the term, what keeps a value of the start: an angle may be one of two; None: just that."""
         self._known: dict[tuple[int, int], tuple[Attachment, Affine]] = {}
         for name, condition in of_scene(scene):
             condition.constrain(name, self)
+        self.of_start |= {k: None for k, one in enumerate(self.terms.held) if one.of_start}
         for name in self.points:  # which have no angle
             self._add_angles(name, ((1.0, Attachment(body=name, point=(0.0, 0.0))),))
 
@@ -81,9 +82,17 @@ class RigidBodies:
         """Return the vector from the first place of a condition to the second [m]."""
         return self.point(scene, condition.second) - self.point(scene, condition.first)
 
+    def line(self, first: Attachment, direction: Any) -> Affine:
+        """Return the unit vector of a line that a body holds."""
+        return self.direction(self.scene, first).turned(plane.rotation(direction))
+
     def across(self, first: Attachment, direction: Any) -> list[tuple[Affine, Array]]:
         """Return the direction of a line that a body holds, with the form of the vector product."""
-        return [(self.direction(self.scene, first).turned(plane.rotation(direction)), plane.CROSS)]
+        return [(self.line(first, direction), plane.CROSS)]
+
+    def angle(self, name: str, side: Attachment, axis: Any) -> Affine:
+        """Return the vector of the angle [rad] of a body at an attachment, with all turns, and zero."""
+        return self._vector(side, ANGLE)
 
     def keep_distance(self, name: str, gap: Affine, length: Function | None) -> None:
         """Require the length of a vector [m]; None: that of the start."""
@@ -101,11 +110,6 @@ class RigidBodies:
         if drive is None:
             self.of_start[len(self.terms.held)] = condition
         self._add_angles(name, ((1.0, condition.second), (-1.0, condition.first)), drive)
-
-    def keep_mesh(self, name: str, condition: Geared) -> None:
-        """Require the weighted sum of angles that the start has."""
-        self.of_start[len(self.terms.held)] = condition
-        self._add_angles(name, zip(condition.factors, condition.sides, strict=True))
 
     def _add_angles(self, name: str, parts: Iterable[tuple[float, Attachment]], drive: Composed | None = None) -> None:
         axis = fixed(np.eye(2)[0][:, None])
@@ -179,12 +183,12 @@ class Closure:
         self.begin, self.own = begin, own
         bodies = RigidBodies(scene)
         held, marks = bodies.terms.held, bodies.marks
-        self._terms = TermValues(held, 2, bodies.lengths)
+        self._terms = TermValues(held, 2, bodies.lengths, counted=True)
         self._names, self._bodies = tuple(one.name for one in held), len(bodies.number)
         self._angular = np.array([one.lengths == 0 for one in held], dtype=bool)
         self._wrapping = bodies.wrapping
         self._of_start, self._kept = list(bodies.of_start), list(bodies.of_start.values())
-        is_free = [not isinstance(one, Turned) or one.is_of_start for one in self._kept]
+        is_free = [one is None or one.is_of_start for one in self._kept]
         self._free = np.array(self._of_start, dtype=np.int64)[is_free]
         self._body = np.array([one.body for one in marks], dtype=np.int64)
         kinds = np.array([one.kind for one in marks], dtype=np.int64)
@@ -254,7 +258,7 @@ class Closure:
         if self._at_start is None:
             found = self._terms.at(self._evaluate(self.begin)[0])[0][:, self._of_start]
             for k, one in enumerate(self._kept):
-                found[:, k] = one.kept(found[:, k]) if isinstance(one, Turned) else found[:, k]
+                found[:, k] = found[:, k] if one is None else one.kept(found[:, k])
             self._at_start = found
         return self._at_start
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shoal.mechanics.joints import Apart, Geared, Turned, of_scene
+from shoal.mechanics.joints import of_scene
 from shoal.mechanics.numerics.tile import Array, Flags
 from shoal.mechanics.reach import extents, span
 from shoal.mechanics.start.closure import Closure
@@ -184,12 +184,7 @@ class Assembly:
     @property
     def _own(self) -> bool:
         """Return whether joints keep what the start gives them."""
-        return any(
-            (isinstance(one, Turned) and one.is_of_start)
-            or (isinstance(one, Apart) and one.length is None)
-            or isinstance(one, Geared)
-            for _, one in of_scene(self.scene)
-        )
+        return any(one.is_of_start for _, one in of_scene(self.scene))
 
     def close(
         self, closure: Closure, u: Array, fixed: Flags, weight: Array | None = None, most: int = ITERATIONS

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from shoal.errors import InputError
-from shoal.mechanics.joints import Apart, Geared, Turned, of_scene
+from shoal.mechanics.joints import Apart, Turned, of_scene
 from shoal.scene import FRAMED, Scene, Weld
 
 
@@ -28,7 +28,7 @@ def numbers_of_start(scene: Scene) -> Iterator[tuple[str, str]]:
             yield f"joints.{name}", "state its `angle`" if weld else "a weld with an `angle` can take its place"
         elif isinstance(one, Apart) and one.length is None:
             yield f"joints.{name}", "state its `length`"
-        elif isinstance(one, Geared):
+        elif not isinstance(one, Turned | Apart) and one.is_of_start:
             yield f"joints.{name}", "state a start of rigid bodies and rods that closes all joints"
     for name, load in scene.loads.items():
         if load.kind == "spring" and load.length is None:

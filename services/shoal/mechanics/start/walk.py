@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from shoal.errors import InputError
-from shoal.mechanics.joints import Along, Apart, Geared, JointCondition, Meet, Turned, of_scene, unknown
+from shoal.mechanics.joints import Along, Apart, JointCondition, Meet, Turned, of_scene, unknown
 from shoal.mechanics.numerics.tile import Array, Number
 from shoal.mechanics.plane import as_complex, phasor
 from shoal.mechanics.start.closure import bending_rate, lead, place_of, rate_of, value_of
@@ -18,7 +18,6 @@ Step = tuple[str, Attachment | None, Attachment | None, Number]
 
 
 _TWO_SIDED = (Meet, Along, Apart, Turned)
-_USUAL = (*_TWO_SIDED, Geared)
 
 
 class Walk:
@@ -54,7 +53,9 @@ class Walk:
                         if condition.length is not None:
                             return there.body, here, there, value_of(condition.length)
         # Any other condition than these may determine it.
-        if any(not isinstance(condition, _USUAL) for _, condition in of_scene(self.scene)):
+        if any(
+            not isinstance(condition, _TWO_SIDED) and not condition.is_of_start for _, condition in of_scene(self.scene)
+        ):
             return next(iter(waiting)), None, None, 0.0
         name = next(iter(waiting))
         raise InputError(f"initial.{name}.position: say where {name} starts; no joint point tells it")

@@ -15,7 +15,7 @@ from shoal.mechanics.assembly.space.attitudes import Attitudes
 from shoal.mechanics.assembly.space.axes import joint_axes
 from shoal.mechanics.assembly.space.sections import chosen_elements
 from shoal.mechanics.frames import BeamFrame, RigidFrame
-from shoal.mechanics.joints import Aligned, Along, Geared, Meet, Square, Turned
+from shoal.mechanics.joints import Aligned, Along, Meet, Square, Turned
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.plane import vector
 from shoal.scene import GROUND, Attachment, Scene
@@ -49,9 +49,9 @@ class SpatialPlacement(Placement):
             raise InputError(f"{body} is flexible; in space only a rigid body holds an axis, a line or an angle")
         return combined(self.attitudes.kept.of_body(body), tuple(image))
 
-    def line(self, body: str, along: Any) -> Affine:
+    def line(self, first: Attachment, direction: Any) -> Affine:
         """Return the unit vector of a line that a body holds: an axis at the start, or an angle in its frame."""
-        return self.of_image(body, self._image_of_line(body, along))
+        return self.of_image(first.body, self._image_of_line(first.body, direction))
 
     def _image_of_line(self, body: str, along: Any) -> Array:
         return self.attitudes.image(body, along) if isinstance(along, tuple) else turns.about_z(along)[:, 0]
@@ -85,28 +85,17 @@ class SpatialPlacement(Placement):
         towards = self.direction(self.scene, second) if is_rod else self.of_image(other, there)
         return self.of_image(body, flat), towards, self.of_image(body, turns.cross(image, flat))
 
-    def keep_mesh(self, name: str, condition: Geared) -> None:
-        """Require the weighted sum of the angles about axes at rest that the start has, but for whole teeth.
-
-        Each angle is that of a vector across its axis, of which it needs two components, as in the plane.
-        """
-        parts = []
-        for side, axis, factor in zip(condition.sides, condition.axes, condition.factors, strict=True):
-            if side.body == GROUND or not factor:
-                continue
-            if not isinstance(self.frames[side.body], RigidFrame):
-                raise InputError(
-                    f"joints.{name}: turns {side.body}, which is not rigid; weld a rigid body to it instead"
-                )
-            if not self.axis(side.body, axis).rests:
-                told = ", ".join(f"{np.ravel(part)[-1]:g}" for part in axis)
-                raise InputError(
-                    f"joints.{name}: {side.body} does not turn about an axis at rest, ({told}) at the start; gears in "
-                    "space turn on hinges whose axes the ground holds"
-                )
-            image = self.attitudes.image(side.body, axis)
-            across = self.of_image(side.body, turns.across(image)[0])
-            one, other = turns.across(turns.unit(vector(*axis)))
-            frame = np.stack(np.broadcast_arrays(one, other, turns.cross(one, other)))
-            parts.append((factor, across.turned(frame)))
-        self.terms.mesh(name, tuple(parts), 0.0, 2 * np.pi / condition.most)
+    def angle(self, name: str, side: Attachment, axis: Any) -> Affine:
+        """Return a unit vector across an axis at rest, in coordinates whose third axis that is. Raises InputError."""
+        if not isinstance(self.frames[side.body], RigidFrame):
+            raise InputError(f"joints.{name}: turns {side.body}, which is not rigid; weld a rigid body to it instead")
+        if not self.axis(side.body, axis).rests:
+            told = ", ".join(f"{np.ravel(part)[-1]:g}" for part in axis)
+            kind = self.scene.joints[name].kind
+            raise InputError(
+                f"joints.{name}: {side.body} does not turn about an axis at rest, ({told}) at the start; a {kind} in "
+                "space turns on hinges whose axes the ground holds"
+            )
+        across = self.of_image(side.body, turns.across(self.attitudes.image(side.body, axis))[0])
+        one, other = turns.across(turns.unit(vector(*axis)))
+        return across.turned(np.stack(np.broadcast_arrays(one, other, turns.cross(one, other))))

@@ -10,7 +10,7 @@ import numpy as np
 from shoal.mechanics.assembly.space.placement import place_in_space
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.term_values import TermValues
-from shoal.mechanics.terms import Mesh, Term
+from shoal.mechanics.terms import Term
 from shoal.scene import Scene
 from shoal.scene.joints import places
 
@@ -43,7 +43,7 @@ def joints_of(scene: Scene, names: Collection[str]) -> tuple[str, ...]:
     )
 
 
-def _combined(scene: Scene, terms: Sequence[Term | Mesh], values: TermValues, q: Array) -> tuple[list[str], Any]:
+def _combined(scene: Scene, terms: Sequence[Term], values: TermValues, q: Array) -> tuple[list[str], Any]:
     """Names of the rows, and the combinations of the terms that they are, (rows, terms).
 
     The cosine and the sine of a driven angle make one row, that of the angle itself.
@@ -53,7 +53,7 @@ def _combined(scene: Scene, terms: Sequence[Term | Mesh], values: TermValues, q:
     names, rows = list[str](), list[dict[int, float]]()
     for number, term in enumerate(terms):
         joint = scene.joints.get(term.name)
-        if isinstance(term, Term) and joint is not None and joint.kind == "driven-angle" and term.drive is not None:
+        if joint is not None and joint.kind == "driven-angle" and term.drive is not None:
             driven.setdefault(term.name, []).append(number)
         else:
             names.append(term.name)

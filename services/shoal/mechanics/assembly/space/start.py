@@ -25,7 +25,6 @@ from shoal.mechanics.numerics.tile import Array, stacked
 from shoal.mechanics.start.start import place_at, rate_at
 from shoal.mechanics.start.strained import gives_way, require_numbers
 from shoal.mechanics.term_values import TermValues
-from shoal.mechanics.terms import Mesh, Term
 from shoal.scene import InitialState, Scene
 from shoal.scene.initial import Quantity
 from shoal.scene.paths import lanes_of
@@ -112,10 +111,10 @@ class _Closing:
 
     def __init__(self, scene: Scene, placement: SpatialPlacement) -> None:
         self.scene, self.placement = scene, placement
-        self.terms = [one for one in placement.terms.held if isinstance(one, Term)]
-        self.meshes = [one for one in placement.terms.held if isinstance(one, Mesh)]
+        self.terms = [one for one in placement.terms.held if not one.of_start]
+        self.moving_terms = [*self.terms, *(one for one in placement.terms.held if one.of_start)]
         self.values = TermValues(self.terms, 3)
-        self.moving = TermValues([*self.terms, *self.meshes], 3)
+        self.moving = TermValues(self.moving_terms, 3)
         self.q, self.v = stacked(placement.positions), stacked(placement.velocities)
         self.size = float(reach.span(scene))
         self.gives_way = gives_way(scene)
@@ -145,8 +144,7 @@ class _Closing:
         for moving in np.flatnonzero(~failed):
             failed[moving] |= not self._move(int(moving))
         self.placement.positions, self.placement.velocities = list(self.q), list(self.v)
-        held = self.placement.terms.held  # teeth mesh as the bodies start
-        held[:] = [one.begin(lambda u: place_at(u, self.q)) if isinstance(one, Mesh) else one for one in held]
+        self.placement.terms.begin(lambda vector: place_at(vector, self.q))
         self.placement.failed = failed
 
     def residual(self, q: Array) -> Array:
@@ -301,7 +299,7 @@ class _Closing:
         return [(one, np.cross(spin, at(one, self.q, lane))) for one in frame.directors]
 
     def _rates(self, lane: int) -> _Rates:
-        scale = np.append(self.scale, np.ones(len(self.meshes)))
+        scale = np.array([self.size**term.lengths for term in self.moving_terms])
         slope = self.moving.of_lane(lane).jacobian(self.q[:, lane][None])[0] / scale[:, None]
         stated = [one for one in self._rows(_RATES, lane) if one.firm]
         return _Rates(
@@ -359,8 +357,7 @@ class _Closing:
         worst = int(np.argmax(np.abs(left))) if left.size else 0
         if left.size and abs(left[worst]) > ROUNDING * pace:
             if self.lanes == 1 and worst < len(slope) and not stated:
-                every: list[Term | Mesh] = [*self.terms, *self.meshes]
-                raise InputError(f"joints.{every[worst].name}: cannot begin to move as it is driven")
+                raise InputError(f"joints.{self.moving_terms[worst].name}: cannot begin to move as it is driven")
             return self._kept(stated, v, 0.0)
         if left.size and abs(left[worst]) > 1e-9 * pace:  # digits of stated rates: the joints come first
             slope_root = np.linalg.solve(root, slope.T).T
