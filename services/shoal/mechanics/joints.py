@@ -15,26 +15,25 @@ import numpy as np
 from shoal.errors import InputError
 from shoal.mechanics.affine import fixed
 from shoal.mechanics.numerics.tile import Number
-from shoal.scene import (
+from shoal.scene import Function, Scene
+from shoal.scene.joints import (
     GROUND,
     Attachment,
+    CoupledCoordinate,
     Coupling,
     Cylindrical,
     Distance,
     DrivenAngle,
-    Function,
     Gear,
     Parallel,
     Perpendicular,
     Planar,
     Revolute,
-    Scene,
     Slider,
     Spherical,
     Universal,
     Weld,
 )
-from shoal.scene.joints import CoupledCoordinate
 from shoal.scene.record import Vector3
 
 UnitVectors = dict[str, Any]
