@@ -313,16 +313,12 @@ class Hinged(JointCondition):
         return {"m1": motion.common_axis(self.first, self.second, self.axis)}
 
 
-Condition = Meet | Along | Apart | Turned | Geared | Sum
-"""What the plane knows; the others are of space."""
-
-
-def _slider(joint: Slider) -> list[Condition]:
+def _slider(joint: Slider) -> list[JointCondition]:
     line = Along(joint.first, joint.second, joint.direction, bool(np.any(joint.mu)))
     return [line, Turned(joint.first, joint.second)] if joint.rotation == "locked" else [line]
 
 
-def _gear(joint: Gear) -> list[Condition]:
+def _gear(joint: Gear) -> list[JointCondition]:
     if np.ndim(joint.ratio):
         raise InputError("ratio of a gear: is of whole teeth, so that it cannot vary; state each in a scene of its own")
     m, n = joint.fraction.numerator, joint.fraction.denominator
@@ -330,7 +326,7 @@ def _gear(joint: Gear) -> list[Condition]:
     return [Geared((joint.second, joint.first, joint.carrier), (n, -m, m - n), (second, first, first))]
 
 
-CONDITIONS: dict[type, Callable[[Any], list[Condition]]] = {
+CONDITIONS: dict[type, Callable[[Any], list[JointCondition]]] = {
     Revolute: lambda joint: [Meet(joint.first, joint.second, bool(np.any(joint.mu)))],
     Weld: lambda joint: [Meet(joint.first, joint.second), Turned(joint.first, joint.second, joint.angle)],
     Slider: _slider,
@@ -343,13 +339,13 @@ CONDITIONS: dict[type, Callable[[Any], list[Condition]]] = {
 }
 
 
-def _spatial_slider(joint: Slider) -> list[Any]:
+def _spatial_slider(joint: Slider) -> list[JointCondition]:
     along = joint.direction if joint.axis is None else joint.axis
     line = Along(joint.first, joint.second, along, bool(np.any(joint.mu)))
     return [line, Turned(joint.first, joint.second)] if joint.rotation == "locked" else [line]
 
 
-def _planar(joint: Planar) -> list[Any]:
+def _planar(joint: Planar) -> list[JointCondition]:
     plane = InPlane(joint.first, joint.second, joint.axis)
     if joint.rotation == "free":
         return [plane]
@@ -358,7 +354,7 @@ def _planar(joint: Planar) -> list[Any]:
     return [plane, Aligned(joint.first, joint.second, joint.axis)]
 
 
-SPATIAL: dict[type, Callable[[Any], list[Any]]] = {
+SPATIAL: dict[type, Callable[[Any], list[JointCondition]]] = {
     Revolute: lambda j: [*CONDITIONS[Revolute](j), Aligned(j.first, j.second, j.axis)],
     Spherical: lambda j: [Meet(j.first, j.second)],
     Universal: lambda j: [Meet(j.first, j.second), Square(j.first, j.second, j.axis, j.second_axis)],
@@ -401,7 +397,7 @@ def of_scene(scene: Scene) -> Iterator[tuple[str, Any]]:
         yield from ((name, condition) for condition in conditions(joint, scene.dimensions))
 
 
-def weld_of(conditions: list[Condition]) -> Turned | None:
+def weld_of(conditions: list[JointCondition]) -> Turned | None:
     """Return the condition that keeps the angle, if another keeps the place as well."""
     held = [one for one in conditions if isinstance(one, Turned) and not one.driven]
     return held[0] if held and any(isinstance(one, Meet) for one in conditions) else None
