@@ -13,7 +13,9 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+import scipy.integrate
 import shoal
 from click.testing import CliRunner
 from shoal import swarm
@@ -102,12 +104,14 @@ def test_the_servers_of_the_tutorial_are_started_as_it_says(tutorial: str) -> No
 
 NEW = re.compile(r"`((?:mechanics|engines|swarm|identification)/\S+\.py)`:$", re.MULTILINE)
 CHANGED = re.compile(r"^\+\+\+ b/services/shoal/(\S+)$", re.MULTILINE)
-FILES = {"element": 3, "joint": 2, "load": 2, "integrator": 3, "engine": 2, "optimiser": 4}
+FILES = {"element": 3, "joint": 2, "condition": 2, "load": 2, "integrator": 3, "engine": 2, "optimiser": 4}
 """How many files a new kind touches, by its page; the last one has a method and a swarm."""
 HELD = {
     "heun": ["tests/mechanics/test_integrators.py"],
     "cross-entropy": ["tests/swarm/test_contract.py"],
-    "pendulum and every_engine and not (counterweight or level or rope)": ["tests/engines/test_capabilities.py"],
+    "pendulum and every_engine and not (counterweight or level or rope or screw)": [
+        "tests/engines/test_capabilities.py"
+    ],
     "nelder-mead": ["tests/identification/methods/test_methods.py"],
     "joint or load or element or refused or mechanics": ["tests/test_kinds.py", "tests/scene/test_refused.py"],
 }
@@ -121,22 +125,32 @@ def copied(folder: Path) -> dict[str, str]:
     return os.environ | place
 
 
+def parts(page: str) -> tuple[dict[str, str], str]:
+    """The new files of a page, and the code that uses what they add."""
+    names, code = NEW.findall((DOCS / page).read_text(encoding="utf-8")), blocks(page)
+    return dict(zip(names, code, strict=False)), "\n".join(code[len(names) :])
+
+
 def extend(page: str, folder: Path) -> str:
     """Write the files of a page below a folder and apply its changes there; the code that uses them."""
-    *files, use = blocks(page)
-    for name, text in zip(NEW.findall((DOCS / page).read_text(encoding="utf-8")), files, strict=True):
+    files, use = parts(page)
+    for name, text in files.items():
         (folder / "services" / "shoal" / name).write_text(text)
     for change in blocks(page, "diff"):
         subprocess.run(["git", "apply", "-"], cwd=folder, input=change, text=True, check=True)
     return use
 
 
-@pytest.mark.parametrize("kind", FILES)
-def test_a_new_kind_touches_few_files(kind: str) -> None:
+def touched(kind: str) -> set[str]:
+    """The files of the library that a page adds or changes."""
     page = f"extend/{kind}.md"
     changed = [name for change in blocks(page, "diff") for name in CHANGED.findall(change)]
-    new = NEW.findall((DOCS / page).read_text(encoding="utf-8"))
-    assert len({*new, *changed}) <= FILES[kind]
+    return {*NEW.findall((DOCS / page).read_text(encoding="utf-8")), *changed}
+
+
+@pytest.mark.parametrize("kind", FILES)
+def test_a_new_kind_touches_few_files(kind: str) -> None:
+    assert len(touched(kind)) <= FILES[kind]
 
 
 @pytest.mark.parametrize("kind", FILES)
@@ -168,7 +182,7 @@ def checked(folder: Path, *command: str) -> None:
 def test_the_code_of_the_pages_is_written_as_ours(tmp_path: Path) -> None:
     copied(tmp_path)
     files = changed(tmp_path)
-    assert len(files) == sum(FILES.values())
+    assert {Path(name).relative_to("services/shoal").as_posix() for name in files} == set().union(*map(touched, FILES))
     checked(tmp_path, "ruff", "check", *files)
     checked(tmp_path, "ruff", "format", "--check", *files)
 
@@ -256,8 +270,20 @@ def test_a_method_and_a_swarm_are_two_files_each_and_find_the_angles(
 def extended(everything: tuple[Path, dict[str, str]]) -> dict[str, Any]:
     """What the pages leave behind that change the mechanics: on a copy of the package, with all their changes in it."""
     folder, environment = everything
-    uses = [blocks(f"extend/{page}.md")[-1] for page in ("element", "joint", "load", "integrator")]
-    wanted = "misses", "gap", "balanced", "rises", "ways", "given_way", "side_by_side", "order"
+    uses = [parts(f"extend/{page}.md")[1] for page in ("element", "joint", "condition", "load", "integrator")]
+    wanted = (
+        "misses",
+        "gap",
+        "balanced",
+        "rises",
+        "threads",
+        "ways",
+        "given_way",
+        "side_by_side",
+        "raised",
+        "met",
+        "order",
+    )
     names = ", ".join(f"{name}={name}" for name in wanted)
     program = "\n".join([*uses, f"import json\nprint(json.dumps(dict({names}), default=lambda of: of.tolist()))"])
     done = subprocess.run(
@@ -283,3 +309,33 @@ def test_pages_of_the_mechanics_do_what_they_say(extended: dict[str, Any]) -> No
     assert extended["side_by_side"] == pytest.approx([0.0, quarter], abs=1e-9)
     assert extended["given_way"] == pytest.approx(1.0, abs=1e-8), "statics knows what the rope holds"
     assert extended["order"] == pytest.approx(2.0, abs=0.1)
+
+
+@pytest.mark.slow  # Compiles the copy.
+def test_a_new_condition_holds_in_motion_statics_modes_reactions_and_load_cells(extended: dict[str, Any]) -> None:
+    """A screw and a rack against m + J / p^2: Newton's law by hand."""
+    mass, inertia, pitch, gravity, stiffness = 2.0, 0.003, -0.05, 9.81, 400.0
+    turning = inertia / pitch**2
+    push = mass * gravity * turning / (mass + turning)
+    fallen = 0.5 * gravity * mass / (mass + turning)
+    rest = mass * gravity / stiffness
+    wanted = [fallen, push, -pitch * push, push, rest, np.sqrt(stiffness / (mass + turning))]
+    assert len(extended["threads"]) == 2, "in the plane and in space"
+    for found in extended["threads"]:
+        assert found == pytest.approx(wanted, rel=1e-8)
+
+
+@pytest.mark.slow  # Compiles the copy.
+def test_a_model_is_chosen_under_a_load_of_a_new_kind(extended: dict[str, Any]) -> None:
+    """A rigid rod that a rope of constant force lifts, by scipy; it bends by a tenth of the tolerance."""
+    pull, inertia = 20.0, 7800.0 * 0.02**2 / 3
+
+    def rate(t: float, state: Any) -> list[float]:
+        tip = np.array([np.cos(state[0]), np.sin(state[0])])
+        rope = np.array([1.0, 3.0]) - tip
+        x, y = pull * rope / np.hypot(*rope)
+        return [state[1], (tip[0] * y - tip[1] * x) / inertia]
+
+    angle = scipy.integrate.solve_ivp(rate, (0.0, 0.4), [0.0, 0.0], t_eval=[0.2, 0.4], rtol=1e-10, atol=1e-12).y[0]
+    assert extended["met"]
+    assert np.array(extended["raised"]) == pytest.approx(np.stack([np.cos(angle), np.sin(angle)], 1), abs=1e-3)
