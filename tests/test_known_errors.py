@@ -351,6 +351,55 @@ def test_no_limit_is_called_kept_that_the_true_machine_passes(seed: int) -> None
         assert one.kept is not None or not decided, (one.limit.text, far, one.errors)
 
 
+@pytest.mark.parametrize("way", ["monte-carlo", "subset"])
+@pytest.mark.parametrize("seed", range(5))
+def test_probabilities_of_every_way_are_as_wide_as_the_neglected_inertia_makes_them(way: str, seed: int) -> None:
+    """Of thick rods taken for slender ones: the interval holds the probability of the true rod, by scipy.
+
+    Where no design point is known, runs are counted with their margins larger and smaller by the known error.
+    """
+    rng = np.random.default_rng(300 + seed)
+    scene = thick_pendulum(rng)
+    begin, deviation = scene.start("r").angle, rng.uniform(0.002, 0.02)
+    angles = begin + deviation * np.linspace(-4.0, 4.0, 161)
+    true = places(scene, angles)[:, 0]
+    bound = float(np.quantile(true, rng.uniform(0.1, 0.9)))
+    exact = float(np.average(true > bound, weights=np.exp(-0.5 * ((angles - begin) / deviation) ** 2)))
+    found = shoal.uncertain(
+        scene,
+        {"initial.r.angle": f"normal({begin!r},{deviation!r})"},
+        times=[scene.solver.duration],
+        limits=[f"e.x > {bound!r}"],
+        limit_method=way,
+        limit_runs=400,
+    )
+    (one,) = found.limits
+    low, high = one.interval
+    assert low <= exact <= high
+    assert one.doubt or high - low < 0.3
+
+
+def test_a_limit_that_no_run_passes_is_undecided_within_the_known_error() -> None:
+    """And so is one that all pass; farther away both are decided."""
+    scene = thick_pendulum(np.random.default_rng(1))
+    begin = scene.start("r").angle
+    vary = {"initial.r.angle": f"normal({begin!r},0.001)"}
+    found = shoal.uncertain(scene, vary, times=[scene.solver.duration])
+    assert found.statistics is not None
+    mean = found.column("e", "x", found.statistics.mean)[-1]
+    std = found.column("e", "x", found.statistics.std)[-1]
+    off = found.column("e", "x", found.model)[-1]
+    assert off > 20 * std
+    for share, undecided in ((0.5, True), (-0.5, True), (3.0, False), (-3.0, False)):
+        limit = f"e.x > {float(mean + share * off)!r}"
+        (one,) = shoal.uncertain(
+            *(scene, vary), times=[scene.solver.duration], limits=[limit], limit_method="monte-carlo", limit_runs=100
+        ).limits
+        assert bool(one.doubt) is undecided, one.doubt
+        low, high = one.interval
+        assert (high - low > 0.9) is undecided
+
+
 def test_a_budget_is_never_smaller_than_its_largest_part() -> None:
     rng = np.random.default_rng(3)
     for _ in range(200):

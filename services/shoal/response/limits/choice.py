@@ -5,14 +5,14 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from shoal.errors import InputError
 from shoal.response.kept import TimeIsUpError
 from shoal.response.limits.counted import contradiction
-from shoal.response.limits.estimate import Estimate, weighted
+from shoal.response.limits.estimate import Estimate
 from shoal.response.limits.form import APART, SHARES, DesignPoint, design_points, distinct
 from shoal.response.limits.importance import Sample, adapted, controlled, sample
 from shoal.response.limits.margins import Margins, least
@@ -65,7 +65,8 @@ DISAGREE = 4.0
 @dataclass(frozen=True)
 class Passing:
     """The answer of a method. doubt: why it should not be believed, empty if it may be; plain: runs that were drawn
-    from the distributions to see whether they contradict it
+    from the distributions to see whether they contradict it; sample: runs by which it can be counted how probable the
+    limit would be if it were elsewhere, None where there are none
     """
 
     estimate: Estimate
@@ -73,6 +74,14 @@ class Passing:
     why: str
     doubt: str = ""
     plain: int = 0
+    sample: Sample | None = None
+
+    @property
+    def shown(self) -> Array | None:
+        """Place of the run that shows how the limit is passed, or comes nearest to it, (parameters,)."""
+        if self.points or self.sample is None:
+            return self.points[0].place if self.points else None
+        return np.asarray(self.sample.places[least(self.sample.rows).argmin()])
 
 
 def form(margins: Margins, seed: int) -> Passing:
@@ -98,23 +107,25 @@ def by_importance(margins: Margins, seed: int) -> Passing:
         return Passing(_nothing("no design point"), [], "importance sampling", "no design point was found to sample at")
     found = sample(margins, adapted(points, []), margins.left, seed + 1)
     why = f"{found.estimate.why} around {_told(points)}"
-    return Passing(found.estimate, points, why, _weak(found.estimate, [found], points, ended=True))
+    return Passing(found.estimate, points, why, _weak(found.estimate, [found], points, ended=True), sample=found)
 
 
 def by_subset(margins: Margins, seed: int) -> Passing:
     """All runs in levels."""
     # About one level for every power of ten down to a millionth.
     found = subset(margins, max(margins.left // 7, 20), seed)
-    return Passing(found.estimate, _seen(found.places), found.estimate.why, _coarse(found.estimate))
+    return Passing(
+        found.estimate, _seen(found.places), found.estimate.why, _coarse(found.estimate), sample=found.sample
+    )
 
 
 def monte_carlo(margins: Margins, seed: int) -> Passing:
     """All runs drawn from the distributions."""
     count = margins.left
     places = np.random.default_rng(seed).standard_normal((count, len(margins.inputs)))
-    rows = margins(places)
-    estimate = weighted(rows, np.ones(count), f"{count} random runs")
-    return Passing(estimate, _seen(places[least(rows) < 0]), estimate.why, _coarse(estimate))
+    drawn = Sample(places, margins(places), np.ones(count))
+    estimate = replace(drawn.estimate, why=f"{count} random runs")
+    return Passing(estimate, _seen(drawn.beyond.places), estimate.why, _coarse(estimate), sample=drawn)
 
 
 def auto(margins: Margins, seed: int) -> Passing:
@@ -130,12 +141,12 @@ def auto(margins: Margins, seed: int) -> Passing:
     rough = pilot.estimate
     if rough.probability >= OFTEN:
         found = monte_carlo(margins, seed + 1)
-        return Passing(found.estimate, found.points, f"{found.why}, as the limit is passed often", found.doubt)
+        return replace(found, why=f"{found.why}, as the limit is passed often")
     plain = np.random.default_rng(seed + 4).standard_normal((int(PLAIN * margins.left), len(margins.inputs)))
     rows = margins(plain)
     searched = _search(margins, pilot, [], seed + 10)
     if not searched.points:
-        return Passing(rough, [], rough.why, contradiction(rough, rows), len(rows))
+        return Passing(rough, [], rough.why, contradiction(rough, rows), len(rows), pilot.sample)
     first = sample(margins, adapted(searched.proposed, searched.beyond), int(FIRST * margins.left), seed + 2)
     searched = _search(margins, pilot, searched.points, seed + 20)
     proposal = adapted(searched.proposed, [*searched.beyond, first], first)
@@ -151,7 +162,7 @@ def auto(margins: Margins, seed: int) -> Passing:
         or _disagree(estimate, "importance sampling", rough, LEAST, "subset simulation")
     )
     why = f"{estimate.why} around {_told(searched.points)}; {rough.why} says {rough.probability:.1e}"
-    return Passing(estimate, searched.points, why, doubt, len(rows))
+    return Passing(estimate, searched.points, why, doubt, len(rows), last)
 
 
 @dataclass(frozen=True)

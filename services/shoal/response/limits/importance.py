@@ -29,7 +29,7 @@ from scipy.cluster import vq
 from shoal.response.inputs import BoolArray, IntArray
 from shoal.response.limits.estimate import Estimate, first_passages, weighted
 from shoal.response.limits.form import DesignPoint
-from shoal.response.limits.margins import Margins
+from shoal.response.limits.margins import Margins, least
 from shoal.trajectory import Array
 
 WIDER = 1.3
@@ -188,6 +188,12 @@ class Sample:
     def beyond(self) -> Sample:
         """Of the runs that pass the limit."""
         return self._some(np.asarray((self.rows < 0).any(axis=1)))
+
+    def shifted(self, off: Array) -> tuple[float, float, float]:
+        """Return the probability if all margins were larger by `off`, (instants,), as they are, and if smaller."""
+        told = (float(self.weights[least(self.rows + by) < 0].sum() / len(self.weights)) for by in (off, 0 * off, -off))
+        fewer, same, more = (min(one, 1.0) for one in told)
+        return fewer, same, more
 
     @property
     def halves(self) -> tuple[Sample, Sample]:

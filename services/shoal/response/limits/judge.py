@@ -108,12 +108,16 @@ def judge(
     if inputs.random.all():
         margins = Margins(told, inputs, most, progress)
         passing = probability(margins, way, seed)
-        shown = None
-        if passing.points:
-            shown = _show(limit, machine, inputs, inputs.standard(passing.points[0].place[None])[0], verify)
-        nan = float("nan")
+        shown, shifted = None, None
+        if passing.shown is not None:
+            shown = _show(limit, machine, inputs, inputs.standard(passing.shown[None])[0], verify)
+        if passing.sample is not None and shown is not None and shown.errors is not None:
+            shifted = passing.sample.shifted(shown.errors.over_time)
+        nan, passing = float("nan"), replace(passing, sample=None)  # which takes much room
         return Judged(
-            limit, way, inputs, times, passing, None, nan, nan, shown, margins.evaluations, margins.failed, margins.why
+            *(limit, way, inputs, times, passing, None, nan, nan),
+            *(shown, margins.evaluations, margins.failed, margins.why),
+            shifted=shifted,
         )
     lower, outer, germs, evaluations, failed = reach(told, abs(limit.bound))
     worst = int(lower.argmin())

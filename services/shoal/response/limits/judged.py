@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +14,7 @@ from shoal.response.control import unseen
 from shoal.response.inputs import Inputs
 from shoal.response.limits.choice import Passing
 from shoal.response.limits.estimate import Estimate
+from shoal.response.limits.form import DesignPoint
 from shoal.response.limits.limit import Limit
 from shoal.response.limits.margin_errors import MarginErrors
 from shoal.trajectory import Array, plain
@@ -129,7 +131,8 @@ class Judged:
     known error of the model, nan where not known; shown: the most probable way to pass it, or the run with the least
     margin; evaluations, failed: runs made for it alone; reason: why the first of these failed; between: of random
     parameters beside intervals; hidden: whether runs would decide it, were the known error of their model not as large
-    as the margin
+    as the margin; shifted: probability counted in runs if the known error of the model made all margins larger, as they
+    are, and if it made them smaller, None where it was not counted
     """
 
     limit: Limit
@@ -146,6 +149,7 @@ class Judged:
     reason: str
     between: Between | None = None
     hidden: bool = False
+    shifted: tuple[float, float, float] | None = None
 
     @property
     def errors(self) -> ErrorBudget:
@@ -190,7 +194,9 @@ class Judged:
         if not found and self.errors.unknown and self.passing is not None:
             found = f"the error of the model is not known ({', '.join(self.errors.unknown)})"
         if not found and (moved := self.moved) > MOST_BEYOND:
-            found = f"the known error of the model, {self.errors}, may change beta by {moved:.2g}"
+            found = f"the known error of the model, {self.errors}, " + (
+                f"may change beta by {moved:.2g}" if math.isfinite(moved) else "decides whether any run passes it"
+            )
         if not found and self.failed:
             found = f"{self.failed} of {self.evaluations} runs failed even with smaller steps: {self.reason}"
         if not found and self.shown is not None and self.shown.status != "ok":
@@ -250,14 +256,26 @@ class Judged:
 
     @property
     def moved(self) -> float:
-        """By how much the known error of the model may change the reliability index, to first order.
+        """By how much the known error of the model may change the reliability index; 0 where none is known.
 
-        0 where there is no such point, or no error is known.
+        To first order at a design point; where there is none, counted in runs.
         """
-        if self.passing is None or not self.passing.points or self.shown is None or self.shown.errors is None:
+        if self.passing is None or self.shown is None or self.shown.errors is None:
             return 0.0
-        point = self.passing.points[0]
-        return float(self.shown.errors.over_time[point.instant] / point.slope) if point.converged else 0.0
+        if self._point is not None:
+            return float(self.shown.errors.over_time[self._point.instant] / self._point.slope)
+        if self.shifted is None:
+            return 0.0
+        fewer, same, more = self.shifted
+        return max(
+            (abs(float(special.ndtri(one) - special.ndtri(same))) for one in (fewer, more) if one != same), default=0.0
+        )
+
+    @property
+    def _point(self) -> DesignPoint | None:
+        """The design point, None where none was found."""
+        points = [] if self.passing is None else self.passing.points
+        return points[0] if points and points[0].converged else None
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -268,7 +286,13 @@ class Judged:
 
     def _with_errors(self, chance: float) -> tuple[float, float]:
         """A probability with the least and the largest reliability index that the error of the model allows."""
-        if not 0.0 < chance < 1.0 or not self.moved:
+        if not self.moved:
             return chance, chance
-        low, high = special.ndtr(special.ndtri(chance) + np.array([-self.moved, self.moved]))
+        fewer, same, more = self.shifted or (0.0, 0.0, 0.0)
+        if self._point is None and not 0.0 < same < 1.0:  # all runs or none pass: nothing to compare with
+            return chance * fewer if same else chance, min(chance + more - same, 1.0)
+        if not 0.0 < chance < 1.0:
+            return chance, chance
+        by = [-self.moved, self.moved] if self._point else special.ndtri([fewer, more]) - special.ndtri(same)
+        low, high = special.ndtr(special.ndtri(chance) + np.array(by))
         return float(low), float(high)

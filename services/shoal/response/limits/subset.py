@@ -14,6 +14,7 @@ import numpy as np
 
 from shoal.response.inputs import BoolArray, IntArray
 from shoal.response.limits.estimate import Estimate, first_passages
+from shoal.response.limits.importance import Sample
 from shoal.response.limits.margins import Margins, least
 from shoal.response.runs import TooManyRunsError
 from shoal.trajectory import Array
@@ -36,13 +37,15 @@ class Levels:
     """What is found.
 
     estimate: of the probability; places, margins: of the runs beyond the limit, (runs, parameters) and (runs,
-    instants); first: places of the runs of the first level, those with the least margins first, (runs, parameters)
+    instants); first: places of the runs of the first level, those with the least margins first, (runs, parameters);
+    sample: all runs, those of a level down to where the next one begins: a stratified sample of the distributions
     """
 
     estimate: Estimate
     places: Array
     margins: Array
     first: Array
+    sample: Sample
 
 
 def subset(margins: Margins, count: int, seed: int) -> Levels:
@@ -60,18 +63,21 @@ def subset(margins: Margins, count: int, seed: int) -> Levels:
     nearest, farthest = _ends(g)
     weight, variance, spread, levels = 1.0, 0.0, 0.6, 0
     chains = np.arange(count)[:, None]
+    strata = list[Sample]()
     while True:
         threshold = float(np.sort(g)[seeds - 1])
         if threshold <= 0 or levels == LEVELS or margins.left < count - seeds:
             break
         inside = g <= threshold
         variance += _variance(inside, chains)
-        weight *= float(np.mean(inside))
+        before, weight = weight, weight * float(np.mean(inside))
         best = np.argsort(g, kind="stable")[:seeds]
+        stratum = Sample(u[~inside], rows[~inside], np.full(int(np.sum(~inside)), before / count))
         try:
             u, rows, g, spread = _chains(margins, u[best], rows[best], threshold, length, spread, random)
         except TooManyRunsError:
             break
+        strata.append(stratum)
         chains = np.arange(count).reshape(length, seeds).T
         levels += 1
         nearest, farthest = min(nearest, _ends(g)[0]), max(farthest, _ends(g)[1])
@@ -89,7 +95,16 @@ def subset(margins: Margins, count: int, seed: int) -> Levels:
         below = f"{weight * SHARE:.2g}"
         why += f"; none has passed the limit, whose probability is below {below} or not reached by its chains"
     estimate = Estimate(weight * share, deviation, why, weight * SHARE, lost)
-    return Levels(estimate, u[beyond], rows[beyond], plain)
+    strata.append(Sample(u, rows, np.full(len(u), weight / count)))
+    return Levels(estimate, u[beyond], rows[beyond], plain, _together(strata))
+
+
+def _together(strata: list[Sample]) -> Sample:
+    """One weighted sample of strata whose weights are probabilities."""
+    places, rows, weights = (
+        np.concatenate([getattr(one, name) for one in strata]) for name in ("places", "rows", "weights")
+    )
+    return Sample(places, rows, weights * len(weights))
 
 
 def _ends(g: Array) -> tuple[float, float]:
