@@ -35,7 +35,7 @@ from shoal.mechanics.analysis.campbell import campbell
 from shoal.mechanics.analysis.modes import modes
 from shoal.mechanics.analysis.reactions import reactions
 from shoal.mechanics.analysis.statics import statics
-from shoal.mechanics.machine import Machine
+from shoal.mechanics.runs import Runs
 from shoal.scene import Scene, load_scene
 from shoal.selection import Selection, select
 from shoal.terminal import screen, tables
@@ -281,7 +281,7 @@ def test_a_mistake_is_one_line_that_says_what_is_right(
         raise AssertionError("compiled or simulated first")
 
     monkeypatch.setattr(warm, "warm_for", wait)
-    monkeypatch.setattr(Machine, "run", wait)
+    monkeypatch.setattr(Runs, "run", wait)
     monkeypatch.chdir(tmp_path)
     Path("folder").mkdir()
     for name, text in FILES.items():

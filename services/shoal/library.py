@@ -66,10 +66,11 @@ def _check_scene(document: Path) -> None:
 def _model(scene: Scene) -> Model:
     """Build the model of a scene, with its functions of time and its start. Raises InputError."""
     from shoal.engines.capabilities import check_acceleration
-    from shoal.mechanics.simulate import machine
+    from shoal.mechanics.machine import Machine
+    from shoal.mechanics.simulate import runs
 
     check_acceleration(scene)
-    return machine(scene, 0.0).model
+    return runs(Machine.of(scene), scene.solver, 0.0).model
 
 
 def _check_recording(document: Path) -> None:

@@ -1,10 +1,8 @@
-"""A scene that is prepared once and simulated many times."""
+"""A scene for the native solver: checked once, simulated many times."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -16,7 +14,7 @@ from shoal.engines.contract import Extremes, check_lanes, sampling_times
 from shoal.errors import InputError
 from shoal.mechanics.machine import Machine
 from shoal.mechanics.persist import persist
-from shoal.mechanics.simulate import machine, simulate
+from shoal.mechanics.simulate import simulate
 from shoal.scene import Scene
 from shoal.scene.paths import unwrapped
 from shoal.trajectory import Array, Trajectory
@@ -28,9 +26,9 @@ KEPT = 16
 class Prepared:
     """A scene that the native solver simulates repeatedly; call it to simulate.
 
-    What depends on the scene alone is computed once: its model, its integrator and stability limit, its reach and its
-    start. Repeated runs use it, in memory that exists already. Threads may call it at the same time: each call takes a
-    work space of its own.
+    What depends on the scene alone is computed once and kept by its `Machine`: its model, its integrator and stability
+    limit, its reach and its start. Repeated runs use it, in memory that exists already. Threads may call it at the same
+    time: each call takes a work space of its own.
 
     Attributes:
         scene: the scene
@@ -40,10 +38,8 @@ class Prepared:
         check_acceleration(scene)
         self.scene = scene
         self._threads = threads
-        self._instants = sampling_times(scene, None)
+        self._machine = Machine.of(scene)
         self._checked: dict[tuple[str, tuple[int, ...], bytes], Array] = {}
-        self._accepted: Extremes = {}
-        self._machines: dict[tuple[float, bool], Machine] = {}
         self._set: dict[str, Prepared] = {}
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -77,7 +73,7 @@ class Prepared:
         if alone is not None:
             raise InputError(f"{alone}: cannot differ from lane to lane; call once for each of its values")
         if lanes:
-            count = check_lanes(self.scene, lanes, self._accepted)
+            count = check_lanes(self.scene, lanes, self._machine.kept("accepted", Extremes))
             if swarm_motion.asked_for(self.scene):
                 return swarm_motion.simulate(swarm_motion.only_lane(self.scene, lanes, count), wanted)
             return simulate(self.scene, wanted, lanes, threads=self._threads, machine=self._machine, whole=whole)
@@ -97,7 +93,7 @@ class Prepared:
 
     def _wanted(self, times: Sequence[float] | Array | None) -> Array:
         if times is None:
-            return self._instants.copy()
+            return sampling_times(self.scene, None)
         given = times if type(times) is np.ndarray else numbers("times", times, "times in s")
         key = given.dtype.str, given.shape, given.tobytes()
         wanted = self._checked.get(key)
@@ -106,32 +102,15 @@ class Prepared:
             _forget(self._checked)
         return wanted.copy()
 
-    def _machine(self, scene: Scene, end: float) -> Machine:
-        key = max(end, scene.solver.duration), end > 0
-        found = self._machines.get(key)
-        if found is None:
-            found = self._machines[key] = machine(scene, end)
-            _forget(self._machines)
-        return found
-
 
 def prepared(scene: Scene, threads: int | None = None) -> Prepared:
-    """A scene, prepared now or by an earlier call."""
-    # Whether the kind of an element was said decides what other values do to a scene.
-    said = tuple("element" in body.model_fields_set for body in scene.bodies.values())
-    return _prepared(_Asked((scene.model_dump_json(), said, threads), scene))
+    """Return a scene for repeated runs, made now or by an earlier call."""
+    machine = Machine.of(scene)
 
+    def make() -> Prepared:
+        return Prepared(machine.scene.model_copy(update={"solver": scene.solver}), threads)
 
-@dataclass(frozen=True)
-class _Asked:
-    key: tuple[str, tuple[bool, ...], int | None]
-    scene: Scene = field(compare=False)
-
-
-@lru_cache(maxsize=32)
-def _prepared(asked: _Asked) -> Prepared:
-    # What is kept does not change with the mappings of a scene that somebody else holds.
-    return Prepared(asked.scene.model_copy(deep=True), asked.key[-1])
+    return machine.kept(("prepared", scene.solver, threads), make)
 
 
 def _of_lanes(value: Any) -> bool:

@@ -20,14 +20,14 @@ import numpy as np
 from shoal.mechanics.model import Model
 from shoal.mechanics.numerics import alike
 from shoal.mechanics.numerics.tile import Array
+from shoal.scene import Solver
 
 SHARE = 0.95
 """Of the highest frequency that leapfrog resolves; the rest is for bending on top of stretching."""
 
 
-def capped(model: Model) -> Model:
-    """The model as its solver moves it: with more inertia where it says so, else as it is."""
-    solver = model.scene.solver
+def capped(model: Model, solver: Solver) -> Model:
+    """The model as a solver moves it: with more inertia where it says so, else as it is."""
     if not solver.caps_inertia or not model.stretching_entries:
         return model
     components, mass_entries = alike.analyse(model.unknowns, model.dimensions, model.mass_entries)

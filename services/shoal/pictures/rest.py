@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from shoal.mechanics.analysis.equilibrium import Equilibrium
 from shoal.mechanics.analysis.evaluate import points
-from shoal.mechanics.assembly.placement import place
+from shoal.mechanics.machine import Machine
 from shoal.mechanics.numerics.tile import stacked
 from shoal.pictures.motion import Motion, traced_out
 from shoal.pictures.numbers import length
@@ -34,7 +34,7 @@ def rest(found: Equilibrium) -> Figure:
 def rest_motion(found: Equilibrium) -> Motion:
     """Two frames: the start and the equilibrium."""
     traced, read = traced_out(found.scene)
-    placement = place(traced)
+    placement = Machine.of(traced).placement
     placed = placement.scene
     places = points([placement.point(placed, at) for at in placed.markers.values()], len(found.q))
     seen = np.stack([places.at(stacked(placement.positions)[:, 0]), places.at(found.q)], axis=1)

@@ -16,8 +16,9 @@ from rich.console import Console
 from rich.table import Table
 from shoal.engines.prepared import Prepared
 from shoal.mechanics.integrators import halting
+from shoal.mechanics.machine import Machine
 from shoal.mechanics.numerics.tile import SINGLE
-from shoal.mechanics.simulate import machine
+from shoal.mechanics.simulate import runs
 from shoal.mechanics.workspace import Workspace
 from shoal.scene import load_scene
 from shoal.trajectory import Array
@@ -39,7 +40,7 @@ def call(name: str, times: Array) -> tuple[int, float, float]:
     """Steps, seconds of a call, and of the march in it with the way back to the start."""
     prepared = Prepared(load_scene(name))
     steps = prepared(times=times).steps
-    kept, lane = machine(prepared.scene, float(times[-1])), slice(0, 1)
+    kept, lane = runs(Machine.of(prepared.scene), prepared.scene.solver, float(times[-1])), slice(0, 1)
     halts = halting(kept.scene.solver, kept.model, kept.choice.name, float(times[-1]))
     space = Workspace(kept.scene.solver, kept.model, kept.choice, SINGLE, lane, times, halts)
     return steps, shortest(lambda: prepared(times=times)), shortest(lambda: space.run(kept.model, lane))

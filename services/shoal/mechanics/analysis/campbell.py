@@ -14,7 +14,7 @@ from shoal.mechanics.analysis import left_out
 from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.analysis.modes import ABOUT, Modes, modes_at_rest, modes_of_motion
 from shoal.mechanics.analysis.steady import steady_motion
-from shoal.mechanics.assembly.placement import place
+from shoal.mechanics.machine import Machine
 from shoal.scene import Scene
 
 if TYPE_CHECKING:
@@ -113,7 +113,7 @@ def campbell(
     speeds = tuple(map(float, speeds))
     if not speeds or not all(np.isfinite(speed) and speed >= 0 for speed in speeds):
         raise InputError(f"speeds: give speeds of at least 0 rad/s, found {', '.join(map(str, speeds)) or 'none'}")
-    evaluator = Evaluator.of(scene)
+    evaluator, placement = Evaluator.of(scene), Machine.of(scene).placement
     q, v = (part[:, 0].copy() for part in (evaluator.model.q0, evaluator.model.v0))
     if any(speeds):
         if np.max(np.abs(v), initial=0.0) <= left_out.STILL:
@@ -134,7 +134,7 @@ def campbell(
                 found.append(modes_at_rest(scene, about=about, count=count, leave_unstable=False))
                 continue
             if not begun:
-                begun = steady_motion(scene, place(scene), evaluator, q, v, 0.0, seek=about == "equilibrium").speed
+                begun = steady_motion(scene, placement, evaluator, q, v, 0.0, seek=about == "equilibrium").speed
                 if not begun:
                     raise InputError("speeds: the start advances and nothing turns; state a spin in initial")
             if about == "start":

@@ -18,10 +18,10 @@ from shoal.mechanics import forces, functions, plane
 from shoal.mechanics.affine import Affine
 from shoal.mechanics.analysis import evaluations, stored
 from shoal.mechanics.analysis.load_stiffness import driven, in_plane, in_space, of_drives
-from shoal.mechanics.assembly.build import build
 from shoal.mechanics.dynamics import derived_rows, work_space
 from shoal.mechanics.elements.families import KERNELS
 from shoal.mechanics.kernels import ready
+from shoal.mechanics.machine import Machine
 from shoal.mechanics.model import Arrays, Model
 from shoal.mechanics.numerics import sparse
 from shoal.mechanics.numerics.tile import SINGLE, Array, Index
@@ -120,7 +120,7 @@ class Evaluator:
     @classmethod
     def of(cls, scene: Scene, *, horizon: float = 0.0) -> Evaluator:
         """The evaluator of a scene; horizon [s]: latest time that will be asked for. Raises InputError."""
-        return cls(build(scene, horizon=horizon))
+        return cls(Machine.of(scene).model(horizon))
 
     @property
     def turns(self) -> Array:

@@ -19,6 +19,7 @@ from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.assembly.placement import place
 from shoal.mechanics.forces import LAW
 from shoal.mechanics.frames import BeamFrame
+from shoal.mechanics.machine import Machine
 from shoal.mechanics.modal.modes import held
 from shoal.mechanics.numerics.tile import Array
 from shoal.scene import InitialState, RigidBody, Rod, Scene
@@ -32,16 +33,16 @@ class FreeBodies:
 
     def __init__(self, evaluator: Evaluator, horizon: float) -> None:
         whole = evaluator.model
-        joined = place(whole.stated)
+        joined = Machine.of(whole.stated).placement
         scene, added = _with_inertia(_without_joints(whole.scene, joined))
-        model = build(scene, horizon=horizon)
+        self.placement = place(scene)
+        model = build(scene, horizon=horizon, placement=self.placement)
         # Springs at rest as they start keep the natural values of the whole machine; joint friction came before them.
         rubbing = whole.forces.size - model.forces.size
         law = whole.forces.law[LAW * rubbing :]
         angles = whole.start_angles[rubbing:]
         model = replace(model, forces=model.forces._replace(law=law), start_angles=angles, shared_tiles={})
         self.scene = whole.scene
-        self.placement = place(model.scene)
         self.evaluator = Evaluator(model)
         self.evaluator.turns = evaluator.turns[rubbing:]
         self.mass = self.evaluator.mass - self._turning(added)

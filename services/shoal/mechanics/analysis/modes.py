@@ -27,8 +27,8 @@ from shoal.mechanics.analysis.statics import statics
 from shoal.mechanics.analysis.steady import EXACT, NotSteadyError, Steady, steady_motion
 from shoal.mechanics.analysis.whirl import whirls
 from shoal.mechanics.assembly.coordinates import Placement
-from shoal.mechanics.assembly.placement import place
 from shoal.mechanics.ended import start_angles
+from shoal.mechanics.machine import Machine
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
 from shoal.scene import Scene
@@ -272,7 +272,7 @@ def _but_for_gravity(scene: Scene, about: str) -> str:
         weightless = scene.with_values({"gravity": [0.0] * scene.dimensions})
         evaluator = Evaluator.of(weightless)
         q, v = (part[:, 0].copy() for part in (evaluator.model.q0, evaluator.model.v0))
-        steady_motion(weightless, place(weightless), evaluator, q, v, 0.0, seek=about == "equilibrium")
+        steady_motion(weightless, Machine.of(weightless).placement, evaluator, q, v, 0.0, seek=about == "equilibrium")
     except (ComputationError, InputError):
         return ""
     zeros = ",".join("0" * scene.dimensions)
@@ -306,7 +306,7 @@ def modes_of_motion(
     scene: Scene, evaluator: Evaluator, q: Array, v: Array, *, about: str, time: float, count: int
 ) -> tuple[Modes, Steady]:
     """The lowest modes about the steady motion that begins at coordinates q with rates v, and that motion."""
-    placement = place(scene)
+    placement = Machine.of(scene).placement
     motion = steady_motion(scene, placement, evaluator, q, v, time, seek=about == "equilibrium")
     metric, freedom = motion.metric, motion.here().freedom
     if names := crossing(evaluator, metric, freedom, motion.q, time):
@@ -353,7 +353,7 @@ def _modes(scene: Scene, evaluator: Evaluator, q: Array, time: float, count: int
         not value and hides(level**2, squares, pull(scene))
         for value, level in zip(roots.values, roots.levels, strict=True)
     ]
-    at, turning = _seen(scene, place(scene), evaluator, q)
+    at, turning = _seen(scene, Machine.of(scene).placement, evaluator, q)
     told = tuple(
         Mode(complex(value), shape, at @ shape, turning @ shape, unknown)
         for value, shape, unknown in list(zip(roots.values, roots.shapes.T, hidden, strict=True))[:count]

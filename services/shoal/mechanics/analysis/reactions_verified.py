@@ -18,8 +18,8 @@ from shoal.errors import ComputationError, ShoalError
 from shoal.mechanics.analysis.joint_reactions import Reactions
 from shoal.mechanics.analysis.mesh_error import beyond, finer
 from shoal.mechanics.analysis.reactions import reactions
-from shoal.mechanics.assembly.build import build
 from shoal.mechanics.integrators import STRIDES, facts, pick
+from shoal.mechanics.machine import Machine
 from shoal.mechanics.reach import span
 from shoal.mechanics.stability import step_limit
 from shoal.scene import Scene
@@ -110,7 +110,7 @@ def _in_time(stated: list[Reactions], scene: Scene, times: Sequence[float]) -> l
 
 def _others(scene: Scene) -> Iterator[dict[str, Any]]:
     """Settings of other runs, the cheapest first."""
-    solver, model = scene.solver, build(scene)
+    solver, model = scene.solver, Machine.of(scene).model()
     name = pick(solver, model, step_limit).name
     names: tuple[str, ...] = (name,)
     tolerances = (100 * solver.relative_tolerance, max(0.1 * solver.relative_tolerance, 1e-14))

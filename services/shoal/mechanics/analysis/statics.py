@@ -25,9 +25,9 @@ from shoal.mechanics.analysis.joint_reactions import reactions_of
 from shoal.mechanics.analysis.small_motions import LEAST, ROUND, TENSION, hides, pull
 from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.assembly.groups import start_angle
-from shoal.mechanics.assembly.placement import place
 from shoal.mechanics.ended import named_turns
 from shoal.mechanics.frames import BeamFrame, PointFrame, RigidFrame
+from shoal.mechanics.machine import Machine
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
 from shoal.scene import Attachment, Scene
@@ -69,7 +69,7 @@ class _Search:
     """One search for an equilibrium."""
 
     def __init__(self, scene: Scene, evaluator: Evaluator, time: float) -> None:
-        self.stated, self.placement = scene, place(scene)
+        self.stated, self.placement = scene, Machine.of(scene).placement
         scene = self.placement.scene
         self.scene, self.evaluator, self.time = scene, evaluator, time
         unknowns = evaluator.model.unknowns

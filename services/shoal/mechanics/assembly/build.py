@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from shoal.compile import progress
 from shoal.mechanics import fitting, functions, terms
+from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.assembly.loads import Loads, naming
 from shoal.mechanics.assembly.masses import Masses
 from shoal.mechanics.assembly.placement import place
@@ -33,12 +35,14 @@ def with_start(model: Model, scene: Scene, lanes: int) -> Model:
     )
 
 
-def build(scene: Scene, lanes: int = 1, horizon: float = 0.0) -> Model:
+def build(scene: Scene, lanes: int = 1, horizon: float = 0.0, placement: Placement | None = None) -> Model:
     """Assemble the model of a scene whose numbers may be arrays over lanes. Raises InputError.
 
-    horizon [s]: functions of time are fitted up to it, and at least up to the end of the scene's duration.
+    horizon [s]: functions of time are fitted up to it, and at least up to the end of the scene's duration. placement:
+    that of the scene, if it is known.
     """
-    placement = place(scene)
+    progress.begin()
+    placement = placement or place(scene)
     stated, scene = scene, placement.scene
     horizon = max(horizon, scene.solver.duration)
     rows = Rows(len(placement.positions))
