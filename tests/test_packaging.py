@@ -155,22 +155,6 @@ def test_temporary_folder_that_others_can_fill_is_not_trusted(tmp_path: Path, mo
     assert not home.kernel_cache().is_relative_to(shared)
 
 
-def test_kernel_cache_follows_the_sources_and_the_compiler(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("SHOAL_HOME", str(tmp_path / "home"))
-    for folder in ("compile", "mechanics", "engines/tree"):
-        shutil.copytree(ROOT / "services/shoal" / folder, tmp_path / folder)
-    before = home.kernel_cache().name
-    assert home.kernel_cache(tmp_path).name == before
-    (tmp_path / "mechanics" / "analysis" / "new.py").write_text("x = 1\n")
-    assert home.kernel_cache(tmp_path).name == before, "no kernel imports this file"
-    (tmp_path / "mechanics" / "elements" / "new.py").write_text("from numba import njit\n")
-    with_new_file = home.kernel_cache(tmp_path).name
-    (tmp_path / "mechanics" / "numerics" / "tile.py").write_text("x = 1\n")
-    with_imported_file = home.kernel_cache(tmp_path).name
-    monkeypatch.setattr(home, "versions", lambda packages: dict.fromkeys(("python", *packages), "0"))
-    assert len({before, with_new_file, with_imported_file, home.kernel_cache(tmp_path).name}) == 4
-
-
 def test_the_choice_of_the_user_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SHOAL_HOME", str(tmp_path))
     monkeypatch.setenv("NUMBA_CACHE_DIR", "elsewhere")

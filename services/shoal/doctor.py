@@ -91,11 +91,11 @@ def _native() -> Check:
 
 
 def _cache() -> Check:
-    """The compiled kernels, and those of sources or processors that are no more."""
+    """The compiled kernels, and folders of versions that kept them elsewhere."""
     current = kernel_cache()
     size = sum(file.stat().st_size for file in current.rglob("*") if file.is_file())
-    others = [folder for folder in current.parent.glob("kernels-*") if folder != current]
-    older = f"; {len(others)} older that may be removed" if others else ""
+    others = len(list(current.parent.glob("kernels-*")))
+    older = f"; {others} older folders beside it, kernels-*, may be removed" if others else ""
     return Check("compile cache", True, f"{current}, {size / 1e6:.0f} MB{older}")
 
 

@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import platform
-import re
 import tempfile
 from pathlib import Path
 from typing import Literal
 
 from shoal.errors import InputError
-from shoal.versions import versions
 
 _PACKAGE = Path(__file__).parent
-_KERNELS = ("compile", "mechanics", "engines/tree")
-_IMPORT = re.compile(
-    r"^\s*from shoal\.((?:compile|mechanics|engines\.tree)[\w.]*) import (\([^)]*\)|.*)$", re.MULTILINE
-)
+_KERNELS = "kernels"
 
 
 def home() -> Path:
@@ -89,18 +83,14 @@ def _of_user(kind: Literal["data", "cache"]) -> Path:
     return (user_data_path if kind == "data" else user_cache_path)("shoal", appauthor=False)
 
 
-def kernel_cache(package: Path = _PACKAGE) -> Path:
+def kernel_cache() -> Path:
     """Return the folder of the compiled kernels, made on demand: in the home, or in the user's cache directory.
 
-    package: the folder of their sources.
-
-    Its name changes with everything the machine code depends on. Numba itself only looks at the file
-    of each kernel, so it would go on using one whose callee in another file has changed. Where
-    nothing can be written there, a private folder among the temporary files takes its place.
+    What is kept there is found by its content (`shoal.compile.content`), so versions may share it. Where nothing can be
+    written, a private folder among the temporary files takes its place.
     """
-    name = f"kernels-{_fingerprint(package)}"
-    folder = (_stated() or _of_checkout() or _of_user("cache")) / name
-    return folder if _writable(folder) else _private_temporary(name)
+    folder = (_stated() or _of_checkout() or _of_user("cache")) / _KERNELS
+    return folder if _writable(folder) else _private_temporary(_KERNELS)
 
 
 def compiled() -> bool:
@@ -112,34 +102,6 @@ def prepare_kernel_cache() -> None:
     """Point Numba at `kernel_cache()` unless the user chose a folder. Call before importing Numba."""
     if not os.environ.get("NUMBA_CACHE_DIR"):
         os.environ["NUMBA_CACHE_DIR"] = str(kernel_cache())
-
-
-def _fingerprint(package: Path) -> str:
-    """Short hash over the kernel sources, the versions of the compiler and the processor."""
-    digest = hashlib.sha256()
-    for name, text in sorted(_kernel_sources(package).items()):
-        digest.update(name.encode() + b"\0" + text.encode() + b"\0")
-    used = versions(("numba", "numpy"))
-    for part in (used["numba"], used["numpy"], used["python"], processor()):
-        digest.update(part.encode() + b"\0")
-    return digest.hexdigest()[:16]
-
-
-def _kernel_sources(package: Path) -> dict[str, str]:
-    """Text by module of every file in the folders of kernels that holds one, or that such a file imports."""
-    texts = {}
-    for source in (file for folder in _KERNELS for file in (package / folder).rglob("*.py")):
-        module = ".".join(source.relative_to(package).with_suffix("").parts)
-        texts[module.removesuffix(".__init__")] = source.read_text(encoding="utf-8")
-    found: dict[str, str] = {}
-    pending = [module for module, text in texts.items() if "njit" in text]
-    while pending:
-        module = pending.pop()
-        if module in texts and module not in found:
-            found[module] = texts[module]
-            for origin, names in _IMPORT.findall(texts[module]):
-                pending += [origin, *(f"{origin}.{name}" for name in re.findall(r"\w+", names))]
-    return found
 
 
 def processor() -> str:

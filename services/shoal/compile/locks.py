@@ -21,7 +21,7 @@ from numba import types
 from numba.core import caching, config, dispatcher, event
 from numba.core.compiler_lock import global_compiler_lock
 
-from shoal.compile import clock, linking
+from shoal.compile import clock, content, linking
 from shoal.compile.progress import report
 from shoal.errors import FULL, ComputationError
 
@@ -119,6 +119,7 @@ def _compile(self: Any, sig: Any) -> Any:
 
     No time limit counts it. Raises ComputationError where there is no room for the machine code.
     """
+    content.address_by_content(self)
     whole = isinstance(self._cache, caching.NullCache)
     name = f"{self.py_func.__module__}.{self.py_func.__qualname__} {sig}"
     with clock.stopped(), global_compiler_lock if whole else _locked(name), linking.level(self, sig):

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from shoal.compile.choice import choose
 from shoal.compile.simd import EIGHT
-from shoal.mechanics.numerics.choice import choose
 from shoal.mechanics.numerics.tile import Array, Index, Number, Tile, index, stacked
 
 PLAN = 5

@@ -13,10 +13,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from shoal.compile.choice import choose
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.integrators import dense
 from shoal.mechanics.model import Arrays
-from shoal.mechanics.numerics.choice import choose
 from shoal.mechanics.numerics.tile import Array, Tile
 
 

@@ -8,6 +8,9 @@ from typing import Any
 
 from numba.extending import overload
 
+ALTERNATIVES: dict[Any, list[tuple[type, Any]]] = {}
+"""By generic function: the kinds of structures and the kernels that compiled calls run with them."""
+
 
 def choose(generic: Any, kind: type, kernel: Any, **options: bool) -> None:
     """Let compiled calls of `generic` with a structure of this kind run a kernel, whose parameters have the same names.
@@ -22,4 +25,5 @@ def choose(generic: Any, kind: type, kernel: Any, **options: bool) -> None:
         return bare if any(getattr(argument, "instance_class", None) is kind for argument in arguments) else None
 
     chosen.__signature__ = inspect.signature(bare)  # type: ignore[attr-defined]
+    ALTERNATIVES.setdefault(generic, []).append((kind, kernel))
     overload(generic, jit_options={"error_model": "numpy", **options})(chosen)

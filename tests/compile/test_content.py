@@ -1,0 +1,142 @@
+"""Compiled kernels are found by their content: an edit reaches the kernels that it changes, and no others."""
+
+from __future__ import annotations
+
+import importlib
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from numba.core.dispatcher import Dispatcher
+from numba.extending import _Intrinsic
+from shoal.compile import content
+
+CALLEE = '''
+from numba import njit
+FACTOR = 2.0
+TABLE = {1: (3.0, 4.0)}
+
+@njit(cache=True)
+def inner(x):
+    """Return a multiple."""
+    return FACTOR * x
+
+@njit(cache=True)
+def other(x):
+    return x - 1.0
+'''
+KERNEL = """
+from numba import njit
+import shoal.callee as callee
+
+@njit(cache=True)
+def kernel(x):
+    return callee.inner(x) + 1.0
+"""
+CHANGES = {
+    "": ("", False),
+    "docstring": ("Return a multiple.", False),
+    "moved": ("from numba", False),
+    "a function that is not called": ("x - 1.0", False),
+    "constant": ("2.0", True),
+    "body": ("FACTOR * x", True),
+    "option": ("(cache=True)", True),
+}
+
+
+@pytest.fixture
+def modules(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], Any]:
+    """Import both modules anew, as parts of the library, and return the second."""
+    import shoal
+
+    monkeypatch.setattr(shoal, "__path__", [*shoal.__path__, str(tmp_path)])
+    (tmp_path / "kernels.py").write_text(KERNEL)
+
+    def load(callee: str) -> Any:
+        (tmp_path / "callee.py").write_text(callee)
+        for name in ("shoal.callee", "shoal.kernels"):
+            sys.modules.pop(name, None)
+        importlib.invalidate_caches()
+        monkeypatch.setattr(sys, "dont_write_bytecode", True)
+        return importlib.import_module("shoal.kernels")
+
+    return load
+
+
+REPLACED = {"moved": "\n\nfrom numba", "option": "(cache=True, fastmath=True)", "constant": "3.0", "body": "FACTOR + x"}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_an_edit_in_another_file_changes_the_key_of_what_it_reaches(modules: Callable[[str], Any], change: str) -> None:
+    text, reaches = CHANGES[change]
+    before = content.key(modules(CALLEE).kernel.py_func, ())
+    edited = CALLEE.replace(text, REPLACED.get(change, "x - 5.0"), 1) if text else CALLEE
+    assert (content.key(modules(edited).kernel.py_func, ()) != before) == reaches
+
+
+RUN = """
+import shoal, sys
+shoal.__path__.append(sys.argv[1])
+from shoal.compile import locks
+locks.install()
+from shoal.kernels import kernel
+print(kernel(2.0), sum(kernel.stats.cache_hits.values()))
+"""
+
+
+def test_a_kernel_is_loaded_until_its_callee_in_another_file_changes(tmp_path: Path) -> None:
+    """Numba by itself would go on using the old one."""
+
+    def run(callee: str) -> str:
+        (tmp_path / "kernels.py").write_text(KERNEL)
+        (tmp_path / "callee.py").write_text(callee)
+        place = {"SHOAL_HOME": str(tmp_path / "home"), "PYTHONDONTWRITEBYTECODE": "1"}
+        command = [sys.executable, "-c", RUN, str(tmp_path)]
+        return subprocess.run(command, env=place, capture_output=True, text=True, check=True).stdout.strip()
+
+    assert run(CALLEE) == "5.0 0"
+    assert run(CALLEE.replace("Return", "Give")) == "5.0 1"
+    assert run(CALLEE.replace("2.0", "7.0")) == "15.0 0"
+    assert run(CALLEE) == "5.0 1", "the first is still there"
+
+
+def test_every_kernel_of_the_library_has_a_key() -> None:
+    """What a kernel reads is of kinds whose content the key knows."""
+    from shoal.engines.tree import march  # noqa: F401
+    from shoal.mechanics import warm  # noqa: F401
+
+    every = {
+        value.py_func
+        for name, module in list(sys.modules.items())
+        if name.startswith("shoal.")
+        for value in vars(module).values()
+        if isinstance(value, Dispatcher)
+    }
+    assert len({content.key(function, ()) for function in every}) > 0.9 * len(every) > 300
+    read = [value for function in every for value in function.__globals__.values()]
+    made_by = {value._defn.__module__ for value in read if isinstance(value, _Intrinsic)}
+    assert made_by <= {f"shoal.compile.{name}" for name in content._INSTRUCTIONS}
+
+
+def test_a_kernel_depends_on_the_kind_of_structure_that_it_is_compiled_for() -> None:
+    """Of the integrators a time loop holds its own: an edit of another one leaves it as it is."""
+    from shoal.mechanics.integrators import leapfrog, rk4
+    from shoal.mechanics.integrators.scheme import advance
+    from shoal.mechanics.march import loop
+
+    def reached(kind: type) -> set[Any]:
+        seen, pending = set(), [loop.py_func]
+        while pending:
+            function = pending.pop()
+            if function not in seen:
+                seen.add(function)
+                pending += content._parts(function, frozenset([kind]))[1]
+        return seen
+
+    assert advance in reached(rk4.Rk4)
+    assert rk4.step.py_func in reached(rk4.Rk4) - reached(leapfrog.Leapfrog)
+    assert leapfrog.step.py_func in reached(leapfrog.Leapfrog) - reached(rk4.Rk4)
+    assert content.key(loop.py_func, "Rk4") != content.key(loop.py_func, "Leapfrog")
