@@ -7,11 +7,14 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import pytest
 from numpy.polynomial.hermite_e import hermegauss
+from scipy import stats
+from scipy.stats import qmc
 from shoal.response import respond
 from shoal.response.inputs import Inputs, Parameter
 from shoal.response.marginals import Interval, Normal
 from shoal.response.respond import Answer
 from shoal.response.runs import Answers
+from shoal.response.statistics import QUANTILES
 from shoal.trajectory import Array
 
 Values = Mapping[str, Array]
@@ -87,6 +90,32 @@ def test_random_chains(seed: int) -> None:
     if random.random() < 0.5:
         known["m2"] = Normal(0.8, deviation)
     judge(told(lambda v: chain(v, t), known), *moments(lambda v: chain(v, t), known, 401 if "k2" not in known else 41))
+
+
+@pytest.mark.parametrize("seed", [7, *(pytest.param(k, marks=pytest.mark.slow) for k in (5, *range(8, 40)))])
+def test_outer_bounds_of_quantiles_hold_those_of_a_double_loop(seed: int) -> None:
+    """Draws of the masses at each stiffness of a grid; the quantiles of 8192 are known to 2 % of the deviation."""
+    random = np.random.default_rng(seed)
+    t = np.linspace(0, random.uniform(15, 60), 7)[1:]
+    widths, deviation = random.uniform(0.03, 0.15, 2), 10 ** random.uniform(-4, -2.3)
+    stiff: dict[str, Interval | Normal] = {
+        f"k{k + 1}": Interval(1 - widths[k], 1 + widths[k]) for k in range(int(random.integers(1, 3)))
+    }
+    masses: dict[str, Interval | Normal] = {"m1": Normal(1.0, deviation), "m2": Normal(0.8, deviation)}
+    answer = told(lambda v: chain(v, t), stiff | masses)
+    assert answer.boxes is not None
+    draws = stats.norm.ppf(qmc.Sobol(2, seed=seed).random(8192))
+    drawn = {"m1": 1.0 + deviation * draws[:, 0], "m2": 0.8 + deviation * draws[:, 1]}
+    axes = [np.linspace(1 - half, 1 + half, 33 if len(stiff) == 1 else 7) for half in widths[: len(stiff)]]
+    grid = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, len(stiff))
+    for values in grid:
+        at = {name: np.full(len(draws), value) for name, value in zip(stiff, values, strict=True)}
+        told_here = chain(at | drawn, t)
+        off = 0.02 * told_here.std(axis=0)
+        for found, exact in zip(answer.boxes.quantiles, np.quantile(told_here, QUANTILES, axis=0), strict=True):
+            low, high = found.widest
+            assert np.all(low <= exact + off)
+            assert np.all(exact <= high + off)
 
 
 @pytest.mark.slow

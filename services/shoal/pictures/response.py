@@ -60,7 +60,7 @@ def _panel(panel: Axes, found: Response, marker: str, quantity: str) -> float:
         widest = float(np.max(upper - lower))
     elif found.boxes is not None:
         mean, levels = found.boxes.mean, found.boxes.quantiles
-        low, high = (column(of) for of in (levels[1].lower, levels[-2].upper))
+        low, high = (column(of) for of in (levels[1].widest[0], levels[-2].widest[1]))
         band(panel, t, low, high, color=BLUE, alpha=0.25, linewidth=0, label="5 % and 95 % at their farthest")
         low, high = (column(of) for of in (mean.lower, mean.upper))
         band(panel, t, low, high, color=ORANGE, alpha=0.5, linewidth=1.5, label="means over the intervals")

@@ -53,10 +53,19 @@ class Ends:
     at_lower: Array
     at_upper: Array
 
+    @property
+    def widest(self) -> tuple[Array, Array]:
+        """Return the outer bounds; the extremes of runs where none are known."""
+        return tuple(
+            np.where(np.isnan(outer), found, outer)
+            for found, outer in ((self.lower, self.lower_outer), (self.upper, self.upper_outer))
+        )  # type: ignore[return-value]
+
 
 @dataclass(frozen=True, eq=False)
 class Boxes:
-    """names: of the intervals; mean, std, quantiles: of every column; gap: the largest distance between outer bounds
+    """names: of the intervals; mean, std, quantiles: of every column, where those of quantiles are what the expansion
+    estimates, so that only their outer bounds are to be printed; gap: the largest distance between outer bounds
     and extremes within the horizon, as a share of the scatter (the largest spread of the mean and deviation together);
     horizon: the last instant up to which they are known [s], infinite if they always are; places, inner: interval
     values that were looked at beyond it, and runs at each; shares: of each random parameter the least and the largest

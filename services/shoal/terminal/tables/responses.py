@@ -30,7 +30,7 @@ def response_table(response: Response) -> None:
     elif response.boxes is not None:
         headings = "mean from", "to", "deviation from", "to", "5 % from", "95 % to"
         mean, std, quantiles = response.boxes.mean, response.boxes.std, response.boxes.quantiles
-        columns = [mean.lower, mean.upper, std.lower, std.upper, quantiles[1].lower, quantiles[-2].upper]
+        columns = [mean.lower, mean.upper, std.lower, std.upper, quantiles[1].widest[0], quantiles[-2].widest[1]]
     else:
         assert response.statistics is not None
         headings = "mean", "deviation", "5 %", "95 %"
