@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 from shoal.engines import get_engine
-from shoal.engines.verification import WRONG, verified
+from shoal.engines.sources import WRONG
+from shoal.engines.verification import verified
 from shoal.errors import ComputationError, InputError
 from shoal.scene import Rod, Scene
 from shoal.trajectory import Trajectory

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from shoal.engines import get_engine, verification
+from shoal.engines import get_engine, sources
 from shoal.engines.verification import verified, verify
 from shoal.scene import load_scene
 from shoal.trajectory import Status
@@ -94,8 +94,8 @@ def test_another_engine_that_is_far_off_is_said_to_differ_and_by_how_much() -> N
 
 
 def test_no_second_run_that_takes_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(verification, "PATIENCE", 0.0)
-    monkeypatch.setattr(verification, "GENEROUS", 0.0)
+    monkeypatch.setattr(sources, "PATIENCE", 0.0)
+    monkeypatch.setattr(sources, "GENEROUS", 0.0)
     stated = verified(get_engine("gauss"), load_scene("flexible-double-pendulum")).model["verification"]
     assert stated["time_error"] is stated["mesh_error"] is None
     assert "that would take" in stated["note"]

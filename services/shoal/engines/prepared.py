@@ -11,9 +11,9 @@ from shoal.arguments import numbers
 from shoal.engines import swarm_motion
 from shoal.engines.capabilities import check_acceleration
 from shoal.engines.contract import Extremes, check_lanes, sampling_times
+from shoal.engines.ways import first_believed
 from shoal.errors import InputError
 from shoal.mechanics.machine import Machine
-from shoal.mechanics.persist import persist
 from shoal.mechanics.simulate import simulate
 from shoal.scene import Scene
 from shoal.scene.paths import unwrapped
@@ -80,7 +80,9 @@ class Prepared:
         if swarm_motion.asked_for(self.scene):
             return swarm_motion.simulate(self.scene, wanted)
         first = simulate(self.scene, wanted, threads=self._threads, machine=self._machine, whole=whole)
-        return persist(self.scene, first, self._threads, whole=whole)
+        return first_believed(
+            self.scene, first, lambda other: simulate(other, wanted, threads=self._threads, whole=whole)
+        )
 
     def _with(self, values: dict[str, Any]) -> Prepared:
         """The scene with some of its fields set."""

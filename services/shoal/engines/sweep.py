@@ -194,7 +194,7 @@ def sweep(
 
 def _gone_on(engine: Engine, scene: Scene, grid: Mapping[str, Array], found: Trajectory) -> Trajectory:
     """Points that failed side by side go on as a scene alone does: one finds the settings, the others take them."""
-    from shoal.mechanics.persist import as_run
+    from shoal.engines.ways import as_run
 
     started, lanes = time.perf_counter(), found.lanes
     points, status = found.points.copy(), list(found.status)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from shoal.engines.verification import on_finer_mesh
+from shoal.engines.ways import on_finer_mesh
 from shoal.response.inputs import BoolArray
 from shoal.response.machine import Machine
 from shoal.response.runs import Runs

@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shoal.engines.deviation import by_source
-from shoal.engines.verification import WRONG, Verification, run_verified
+from shoal.engines.sources import WRONG
+from shoal.engines.verification import Verification, run_verified
 from shoal.error_budget import ErrorBudget, worst
 from shoal.response.boxes import Boxes, Ends
 from shoal.response.machine import Machine, stable

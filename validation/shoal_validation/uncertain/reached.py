@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 from shoal.engines import get_engine
-from shoal.engines.verification import on_finer_mesh
+from shoal.engines.ways import on_finer_mesh
 from shoal.response import Response, respond, uncertain
 from shoal.response.inputs import Inputs, Parameter
 from shoal.response.machine import Machine

@@ -9,7 +9,7 @@ import numpy as np
 
 from shoal.engines.gauss import GaussEngine
 from shoal.engines.theory import WITH_SHEAR
-from shoal.engines.verification import CLOSE
+from shoal.engines.ways import CLOSE
 from shoal.errors import InputError
 from shoal.identification.forward import ForwardModel
 from shoal.mechanics.integrators import facts
