@@ -55,7 +55,7 @@ def _stretching(model: Model) -> Any:
 
 def _models(scene: Scene) -> tuple[Model, Model]:
     plain = build(scene)
-    return plain, inertia_cap.capped(plain, plain.scene.solver)
+    return plain, inertia_cap.capped(plain, plain.scene.solver.step)
 
 
 @every_element

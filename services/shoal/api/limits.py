@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from itertools import product
 
 from shoal.api.settings import Settings
-from shoal.engines.swarm_motion import asked_for
+from shoal.engines.capabilities import is_moved_by_swarm
 from shoal.errors import InputError
 from shoal.mechanics.integrators import INTEGRATORS, facts
 from shoal.scene import Scene
@@ -33,7 +33,7 @@ def check_scene(scene: Scene, settings: Settings, times: Sequence[float] | None 
         size = f"{samples} samples of {len(scene.markers)} markers in {lanes} lanes"
         raise TooMuch(f"times: {size}; this service returns {settings.max_values} values")
     end = solver.duration if times is None else max(times, default=0.0)
-    search = solver.swarm_size * solver.swarm_iterations if asked_for(scene) else 1
+    search = solver.swarm_size * solver.swarm_iterations if is_moved_by_swarm(scene) else 1
     field, step = ("max_step", (solver.max_step or math.inf) / STAGES) if _adaptive(scene) else ("step", solver.step)
     work = math.ceil(min(end / step, 1e18)) * elements * lanes * search
     if work > settings.max_work:

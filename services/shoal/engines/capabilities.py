@@ -129,6 +129,13 @@ def check_acceleration(scene: Scene) -> None:
         raise InputError(f"solver.acceleration: no way {name!r}; there are {', '.join(known)}")
 
 
+def is_moved_by_swarm(scene: Scene) -> bool:
+    """Return whether `solver.acceleration` names a swarm, which seeks every acceleration."""
+    from shoal.swarm import OPTIMIZERS
+
+    return scene.solver.acceleration in OPTIMIZERS
+
+
 def of_kind(table: Mapping[str, T], kind: str, where: str) -> T:
     """Return the entry for a kind that a field names. Raises InputError for a kind without an entry."""
     if kind not in table:

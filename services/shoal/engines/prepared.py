@@ -9,7 +9,7 @@ import numpy as np
 
 from shoal.arguments import numbers
 from shoal.engines import swarm_motion
-from shoal.engines.capabilities import check_acceleration
+from shoal.engines.capabilities import check_acceleration, is_moved_by_swarm
 from shoal.engines.contract import Extremes, check_lanes, sampling_times
 from shoal.engines.ways import first_believed
 from shoal.errors import InputError
@@ -74,10 +74,10 @@ class Prepared:
             raise InputError(f"{alone}: cannot differ from lane to lane; call once for each of its values")
         if lanes:
             count = check_lanes(self.scene, lanes, self._machine.kept("accepted", Extremes))
-            if swarm_motion.asked_for(self.scene):
+            if is_moved_by_swarm(self.scene):
                 return swarm_motion.simulate(swarm_motion.only_lane(self.scene, lanes, count), wanted)
             return simulate(self.scene, wanted, lanes, threads=self._threads, machine=self._machine, whole=whole)
-        if swarm_motion.asked_for(self.scene):
+        if is_moved_by_swarm(self.scene):
             return swarm_motion.simulate(self.scene, wanted)
         first = simulate(self.scene, wanted, threads=self._threads, machine=self._machine, whole=whole)
         return first_believed(

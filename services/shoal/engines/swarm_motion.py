@@ -66,11 +66,6 @@ class Search:
     progress: Callable[[int, int], None] | None = None
 
 
-def asked_for(scene: Scene) -> bool:
-    """Return whether `solver.acceleration` names a swarm."""
-    return scene.solver.acceleration in OPTIMIZERS
-
-
 def simulate(scene: Scene, times: Array, search: Search | None = None) -> Trajectory:
     """Motion of a scene whose accelerations a swarm seeks, sampled at `times` [s]: the march of all other runs.
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from shoal.engines import get_engine
-from shoal.engines.swarm_motion import asked_for
+from shoal.engines.capabilities import is_moved_by_swarm
 from shoal.errors import ComputationError, InputError
 from shoal.fmu.inputs import require_input
 from shoal.fmu.running import CONTENT, Running, identifier
@@ -36,7 +36,7 @@ def export(
     default the scene's name in the working folder; inputs: loads' scales or torques and drives that a host may change
     in the run; fmi: version, 2 or 3
     """
-    if asked_for(scene):
+    if is_moved_by_swarm(scene):
         raise InputError(f"solver.acceleration: {scene.solver.acceleration!r} is for studies; a unit needs a solver")
     chosen = list(dict.fromkeys(paths)) or _usual(scene)
     for path in inputs:

@@ -20,15 +20,14 @@ import numpy as np
 from shoal.mechanics.model import Model
 from shoal.mechanics.numerics import alike
 from shoal.mechanics.numerics.tile import Array
-from shoal.scene import Solver
 
 SHARE = 0.95
 """Of the highest frequency that leapfrog resolves; the rest is for bending on top of stretching."""
 
 
-def capped(model: Model, solver: Solver) -> Model:
-    """The model as a solver moves it: with more inertia where it says so, else as it is."""
-    if not solver.caps_inertia or not model.stretching_entries:
+def capped(model: Model, step: float) -> Model:
+    """The model with as much more inertia as a step [s] of leapfrog asks for; itself where it asks for none."""
+    if not model.stretching_entries:
         return model
     components, mass_entries = alike.analyse(model.unknowns, model.dimensions, model.mass_entries)
     also, stretching_entries = alike.analyse(model.unknowns, model.dimensions, model.stretching_entries)
@@ -39,7 +38,7 @@ def capped(model: Model, solver: Solver) -> Model:
     root = np.linalg.cholesky(mass)
     inverse = np.linalg.inv(root)
     squares, modes = np.linalg.eigh(inverse @ _dense(stretching_entries, size) @ inverse.swapaxes(-1, -2))
-    excess = np.maximum(squares / (2 * SHARE / solver.step) ** 2 - 1, 0.0)
+    excess = np.maximum(squares / (2 * SHARE / step) ** 2 - 1, 0.0)
     moved = root @ modes  # M phi, as M = root root' and phi = root'^-1 modes
     mass = mass + (moved * excess[:, None, :]) @ moved.swapaxes(-1, -2)
     entries = {

@@ -56,7 +56,7 @@ def simulate(
     model = build(scene.with_lanes(values), lanes, max(end, scene.solver.duration))
     each = ({path: float(numbers[lane]) for path, numbers in values.items()} for lane in range(lanes))
     model = _begun(model, [scene.with_values(one) for one in each] if found else [])
-    model = capped(model, scene.solver)
+    model = _as_moved(model, scene.solver)
     choice = pick(scene.solver, model, step_limit if end > 0 else _unlimited)
     return Runs(scene, model, choice, alone=False).run(times, threads=threads, begin=begin, whole=whole)
 
@@ -69,7 +69,7 @@ def runs(machine: Machine, solver: Solver, end: float) -> Runs:
     horizon, moving = max(end, solver.duration), end > 0
 
     def make() -> Runs:
-        model = capped(at_start(machine, horizon), solver)
+        model = _as_moved(at_start(machine, horizon), solver)
         limit = (lambda _, facts: _step_limit(machine, solver, horizon, facts)) if moving else _unlimited
         return Runs(machine.scene.model_copy(update={"solver": solver}), model, pick(solver, model, limit))
 
@@ -96,7 +96,7 @@ def at_start(machine: Machine, horizon: float) -> Model:
 def _step_limit(machine: Machine, solver: Solver, horizon: float, integrator: Facts) -> float:
     """Return the stable step of a machine, which depends on the solver only where that raises inertia."""
     key = "step limit", horizon, integrator, solver.step if solver.caps_inertia else None
-    return machine.kept(key, lambda: step_limit(capped(at_start(machine, horizon), solver), integrator))
+    return machine.kept(key, lambda: step_limit(_as_moved(at_start(machine, horizon), solver), integrator))
 
 
 def _begun(model: Model, scenes: list[Scene]) -> Model:
@@ -113,6 +113,11 @@ def _begun(model: Model, scenes: list[Scene]) -> Model:
     from shoal.mechanics.analysis.at_rest import begun
 
     return begun(model, scenes)
+
+
+def _as_moved(model: Model, solver: Solver) -> Model:
+    """The model as a solver moves it: with more inertia where it says so, else as it is."""
+    return capped(model, solver.step) if solver.caps_inertia else model
 
 
 def _unlimited(model: Model, integrator: Facts) -> float:

@@ -22,6 +22,7 @@ from rich.console import Console
 from rich.table import Table
 from scipy.integrate import solve_ivp
 from shoal.engines import swarm_motion
+from shoal.engines.capabilities import is_moved_by_swarm
 from shoal.engines.swarm_motion import Search, Switches
 from shoal.mechanics.simulate import simulate
 from shoal.scene import Scene, load_scene
@@ -136,7 +137,7 @@ def passage(
     """One solver through the singular positions of the linkage."""
     end = np.linspace(0.0, duration, 101)[1:]
     scene = _moving(integrator, step, duration).with_values({"solver.project": project, "solver.acceleration": solver})
-    if swarm_motion.asked_for(scene):
+    if is_moved_by_swarm(scene):
         run = swarm_motion.simulate(scene, end, Search(switches=Switches(**ABLATIONS[ablation])))
     else:
         run = simulate(scene, end)

@@ -1,4 +1,6 @@
-"""Mesh error by Richardson extrapolation: the same computation on twice as many elements of all bodies.
+"""Errors of places of rest and modes: the same computation on a finer mesh and with shear, compared.
+
+The error of the mesh follows by Richardson extrapolation, from twice as many elements of all bodies.
 
 The error of the finer of two meshes is d / (f - 1), with their distance d and the factor f by which it falls with each
 doubling. Factors above that of second order are not used, though cables and quintic elements converge faster: an
@@ -10,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Literal
+from typing import Literal, TypeVar
 
 import numpy as np
 
@@ -22,6 +24,8 @@ from shoal.mechanics.analysis.statics import statics
 from shoal.scene import Scene
 from shoal.scene.refined import refined
 from shoal.scene.shear import stouter
+
+T = TypeVar("T")
 
 FALLS = (2.0, 4.0)
 """Between these factors the distance of two meshes is taken to fall with each doubling: at most as at order two."""
@@ -46,6 +50,22 @@ def beyond(gap: float, last: float = np.nan) -> float:
     return max(gap, last / FALLS[1]) / (fall - 1.0)
 
 
+def second_runs(scene: Scene, run: Callable[[str, Scene], T], *, exact: bool = True) -> dict[str, T | None]:
+    """Return a computation by source of error: on a finer mesh, and with the shear and inertia that slender rods lack.
+
+    A source that the scene does not have is left out; None where a computation fails. run: of a source and its scene;
+    exact: see `stouter`
+    """
+    found: dict[str, T | None] = {}
+    for source, other in (("mesh", finer(scene)), ("theory", stouter(scene, exact=exact))):
+        if other is not None:
+            try:
+                found[source] = run(source, other)
+            except ShoalError:
+                found[source] = None
+    return found
+
+
 def of_equilibrium(found: Equilibrium, scene: Scene) -> Equilibrium:
     """A place of rest of a scene with how far its markers are from the limit of ever finer meshes, about [m].
 
@@ -53,20 +73,18 @@ def of_equilibrium(found: Equilibrium, scene: Scene) -> Equilibrium:
     """
     if not found.ok:
         return found
-    mesh, theory, missing = None, None, list[str]()
-    if (fine := finer(scene)) is not None:
-        second = statics(fine, found.time)
-        gap = apart(found, second)
-        mesh = gap + beyond(gap) if second.ok else None
-        missing += [] if second.ok else ["mesh"]
-    if any(scene.flexible_rods) and (stout := stouter(scene)) is not None:
-        try:
-            other = statics(stout, found.time)
-        except ShoalError:
-            other = None
-        theory = apart(found, other) if other is not None and other.ok else None
-        missing += [] if theory is not None else ["theory"]
-    return replace(found, mesh_error=mesh, theory_error=theory, not_estimated=tuple(missing), estimated=True)
+    if not any(scene.flexible_rods):
+        return replace(found, estimated=True)
+    runs = second_runs(scene, lambda _, other: statics(other, found.time))
+    gaps = {source: apart(found, other) if other is not None and other.ok else None for source, other in runs.items()}
+    gap = gaps.get("mesh")
+    return replace(
+        found,
+        mesh_error=None if gap is None else gap + beyond(gap),
+        theory_error=gaps.get("theory"),
+        not_estimated=tuple(source for source, away in gaps.items() if away is None),
+        estimated=True,
+    )
 
 
 def apart(one: Equilibrium, other: Equilibrium) -> float:
@@ -90,21 +108,15 @@ def of_campbell(found: Campbell, scene: Scene) -> Campbell:
         return found
     count = max((len(one.modes) for one in found.modes if one), default=1)
 
-    def run(other: Scene) -> list[Modes | None]:
-        try:
-            return list(campbell(other, found.speeds, about=_about(found.about), count=count).modes)
-        except ShoalError:
-            return [None] * len(found.modes)
+    def run(other: Scene) -> Sequence[Modes | None]:
+        return campbell(other, found.speeds, about=_about(found.about), count=count).modes
 
     return replace(found, modes=tuple(_with_errors(found.modes, scene, run)))
 
 
 def _modes(found: Modes, scene: Scene) -> Modes | None:
     """Those of another scene; None where it has none."""
-    try:
-        second = modes(scene, about=_about(found.about), count=len(found.modes))
-    except ShoalError:
-        return None
+    second = modes(scene, about=_about(found.about), count=len(found.modes))
     return second if second.ok else None
 
 
@@ -116,14 +128,13 @@ def _with_errors(
     found: Sequence[Modes | None], scene: Scene, run: Callable[[Scene], Sequence[Modes | None]]
 ) -> list[Modes | None]:
     """Modes with the errors of their eigenvalues. run: those of another scene, in the same order"""
-    others = {"mesh": finer(scene), "theory": stouter(scene)}
-    runs = {source: run(other) for source, other in others.items() if other is not None}
+    runs = second_runs(scene, lambda _, other: run(other))
     told = list[Modes | None]()
     for number, one in enumerate(found):
         if one is None:
             told.append(None)
             continue
-        gaps = {source: _gaps(one, second[number]) for source, second in runs.items()}
+        gaps = {source: _gaps(one, second[number] if second else None) for source, second in runs.items()}
         told.append(
             replace(
                 one,
