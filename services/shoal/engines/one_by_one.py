@@ -15,6 +15,16 @@ from shoal.scene import Scene
 from shoal.trajectory import Array, Status, Trajectory
 
 
+class OneByOne:
+    """Engine that has no lanes of its own."""
+
+    def simulate_many(
+        self: Engine, scene: Scene, values: Mapping[str, Array], times: Sequence[float] | Array | None = None
+    ) -> Trajectory:
+        """Run one scene per lane, one after the other; a lane that failed is not a number and has its status."""
+        return one_by_one(self, scene, values, times)
+
+
 def one_by_one(
     engine: Engine,
     scene: Scene,

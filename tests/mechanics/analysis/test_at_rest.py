@@ -13,7 +13,7 @@ from shoal.engines import get_engine
 from shoal.engines.verification import verified
 from shoal.errors import InputError
 from shoal.mechanics.analysis.modes import modes
-from shoal.mechanics.analysis.motion_state import states
+from shoal.mechanics.analysis.reactions import states
 from shoal.mechanics.analysis.statics import statics
 from shoal.scene import Scene
 

@@ -10,8 +10,7 @@ from shoal.errors import ComputationError, InputError
 from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.analysis.joint_reactions import reactions_of
 from shoal.mechanics.analysis.modes import modes
-from shoal.mechanics.analysis.motion_state import states
-from shoal.mechanics.analysis.reactions import reactions
+from shoal.mechanics.analysis.reactions import reactions, states
 from shoal.mechanics.analysis.sections import sections
 from shoal.mechanics.analysis.statics import statics
 from shoal.scene import Scene, load_scene

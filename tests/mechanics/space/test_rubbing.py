@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from shoal.errors import InputError
 from shoal.mechanics.analysis.joint_reactions import reactions_of
-from shoal.mechanics.analysis.motion_state import states
+from shoal.mechanics.analysis.reactions import states
 from shoal.mechanics.simulate import simulate
 from shoal.scene import Scene
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -20,7 +20,7 @@ from shoal.engines.exudyn.record import Record, Steps, choose_steps
 from shoal.engines.exudyn.space.build import build_in_space
 from shoal.engines.exudyn.space.joints import SPATIAL_JOINTS
 from shoal.engines.interrupts import interruptible
-from shoal.engines.one_by_one import one_by_one
+from shoal.engines.one_by_one import OneByOne
 from shoal.engines.sections import Sections
 from shoal.mechanics.halts import CROSSED
 from shoal.mechanics.start.start import facts
@@ -65,7 +65,7 @@ SPATIAL_ELEMENTS: dict[Beam, frozenset[str]] = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class ExudynEngine:
+class ExudynEngine(OneByOne):
     """Simulates a scene with Exudyn's implicit integrators at a fixed step, file output off.
 
     beam: what stands for a rod whose element is `ancf-cable`: Exudyn's own ANCF cable with the
@@ -145,12 +145,6 @@ class ExudynEngine:
         if scene.dimensions == 3:
             return build_in_space(exu, scene, self.beam, end, system_of)
         return build(exu, scene, self.beam, end, system_of)
-
-    def simulate_many(
-        self, scene: Scene, values: Mapping[str, Array], times: Sequence[float] | Array | None = None
-    ) -> Trajectory:
-        """Run one scene per lane, one after the other; a lane that failed is not a number and has its status."""
-        return one_by_one(self, scene, values, times)
 
     def _run(self, exu: Any, machine: Machine, record: Record) -> str:
         """Integrate, filling the record. Returns why it ended early, or nothing."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -14,7 +14,7 @@ import numpy as np
 from shoal.engines.capabilities import require
 from shoal.engines.contract import Capabilities, sampling_times
 from shoal.engines.mujoco.mjcf import Mjcf
-from shoal.engines.one_by_one import one_by_one
+from shoal.engines.one_by_one import OneByOne
 from shoal.errors import InputError
 from shoal.mechanics.reach import span
 from shoal.mechanics.start.start import facts
@@ -35,7 +35,7 @@ def library() -> Any:
 
 
 @dataclass(frozen=True)
-class MujocoEngine:
+class MujocoEngine(OneByOne):
     """MuJoCo's classical Runge-Kutta method at the scene's step, shortened so that steps end on the requested times."""
 
     name: str = "mujoco"
@@ -90,12 +90,6 @@ class MujocoEngine:
             model={"mujoco": mujoco.__version__, "unknowns": int(model.nv), "constraints": int(model.neq),
                    "integrator": "rk4", "step": scene.solver.step} | facts(scene, machine.initial, span(scene)),
         )  # fmt: skip
-
-    def simulate_many(
-        self, scene: Scene, values: Mapping[str, Array], times: Sequence[float] | Array | None = None
-    ) -> Trajectory:
-        """Run one scene per lane, one after the other; a lane that failed is not a number and has its status."""
-        return one_by_one(self, scene, values, times)
 
 
 @contextmanager

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from shoal.engines.capabilities import require
 from shoal.engines.contract import Capabilities, sampling_times
-from shoal.engines.one_by_one import one_by_one
+from shoal.engines.one_by_one import OneByOne
 from shoal.engines.tree.scene import SceneTree
 from shoal.engines.tree.simulate import SpatialMotion, simulate
 from shoal.mechanics.reach import span
@@ -24,7 +24,7 @@ BETWEEN = 0.01
 
 
 @dataclass(frozen=True)
-class TreeEngine:
+class TreeEngine(OneByOne):
     """Minimal coordinates of open chains of rigid bodies, in the plane and in space.
 
     Dormand and Prince's method of order 8 at the scene's tolerance, or the classical Runge-Kutta method at its step
@@ -75,12 +75,6 @@ class TreeEngine:
             model={**motion.model, "unknowns": motion.model["rates"], "constraints": 0}
             | facts(scene, tree.initial, span(scene)),
         )
-
-    def simulate_many(
-        self, scene: Scene, values: Mapping[str, Array], times: Sequence[float] | Array | None = None
-    ) -> Trajectory:
-        """Run one scene per lane, one after the other; a lane that failed is not a number and has its status."""
-        return one_by_one(self, scene, values, times)
 
 
 def _angle(motion: SpatialMotion, scene: Scene, body: str) -> Array:
