@@ -11,11 +11,14 @@ import numpy as np
 import pytest
 import yaml
 from click.testing import CliRunner
+from scipy.optimize import brentq
 from shoal.cli import main
 from shoal.engines import get_engine
 from shoal.engines.verification import verified
 from shoal.errors import InputError
 from shoal.fmu.energy import energies
+from shoal.mechanics.analysis.modes import modes
+from shoal.mechanics.analysis.statics import statics
 from shoal.scene import Scene, load_scene
 from shoal.wire import packed, unpacked
 
@@ -281,3 +284,40 @@ def test_another_engine_refuses_it() -> None:
         InputError, match=r"^initial.from: engine exudyn cannot do starts at the end of a run; use gauss$"
     ):
         get_engine("exudyn").simulate(scene)
+
+
+def leaning(initial: Any) -> Scene:
+    """An arm above its joint that a spring holds too weakly to stand: it leans to one side or to the other."""
+    return Scene.parse(
+        {
+            "name": "leaning",
+            "bodies": {"arm": {"kind": "rigid-body", "mass": 1.0, "inertia": 0.01, "centre_of_mass": [0.3, 0.0]}},
+            "joints": {"pin": {"first": GROUND, "second": {"body": "arm"}, "friction": 0.5}},
+            "loads": {"coil": {"kind": "torsion-spring", "first": GROUND, "second": {"body": "arm"}, "stiffness": 1.0,
+                               "angle": np.pi / 2}},
+            "markers": {"middle": {"body": "arm", "point": [0.3, 0.0]}},
+            "initial": initial,
+            "solver": {"duration": 8.0, "samples": 2},
+        }
+    )  # fmt: skip
+
+
+def test_statics_and_modes_begin_where_the_run_ended() -> None:
+    """Not at the angles beside `from`, from which the arm falls to the other side."""
+    turn, weight, inertia = 2.0, 9.81 * 0.3, 0.01 + 0.3**2
+    end = end_of(leaning({"arm": {"angle": np.pi / 2 + turn}}), 8.0)
+    scene = leaning({"arm": {"angle": np.pi / 2 - turn}}).with_values({"initial.from": end})
+    lean = brentq(lambda a: weight * np.sin(a) - a, 1.0, 3.0)
+    rest = statics(scene)
+    assert rest.ok, rest.message
+    assert rest.marker("middle") == pytest.approx(0.3 * np.array([-np.sin(lean), np.cos(lean)]), abs=1e-7)
+    assert rest.angle("middle") == pytest.approx(np.pi / 2 + lean, abs=1e-7)
+    for about in ("start", "equilibrium"):
+        (mode,) = modes(scene, about=about).modes
+        assert mode.angular_frequency**2 == pytest.approx((1.0 - weight * np.cos(lean)) / inertia, rel=1e-6)
+
+
+def test_modes_about_a_start_at_rest_are_those_of_the_place_of_rest() -> None:
+    scene = leaning({"from": "statics", "arm": {"angle": 0.3}})
+    (start,), (rest,) = (modes(scene, about=about).modes for about in ("start", "equilibrium"))
+    assert start.eigenvalue == pytest.approx(rest.eigenvalue, rel=1e-9)

@@ -9,9 +9,11 @@ import numpy as np
 
 from shoal.errors import InputError
 from shoal.mechanics.analysis.equilibrium import Equilibrium
+from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.analysis.going_on import taken_up
 from shoal.mechanics.analysis.statics import statics
 from shoal.mechanics.ended import start_angles
+from shoal.mechanics.machine import Machine
 from shoal.mechanics.model import Model
 from shoal.scene import Scene
 from shoal.scene.ended import End
@@ -31,6 +33,14 @@ def begun(model: Model, scenes: Sequence[Scene] | None = None) -> Model:
     places = np.stack([one.q for one in found], axis=1)
     angles = start_angles(model, [one.turns for one in found])
     return replace(model, q0=places, v0=np.zeros_like(places), start_angles=angles, shared_tiles={})
+
+
+def at_start(scene: Scene, *, horizon: float = 0.0) -> Evaluator:
+    """Return an evaluator of a scene where its motion begins; horizon [s]: latest time that will be asked for.
+
+    Raises InputError if the scene cannot be modelled, or its start as `begun` does.
+    """
+    return Evaluator(begun(Machine.of(scene).model(horizon)))
 
 
 def _equilibrium(scene: Scene) -> Equilibrium:

@@ -11,7 +11,7 @@ import numpy as np
 from shoal.arguments import check, one_of
 from shoal.errors import ComputationError, InputError
 from shoal.mechanics.analysis import left_out
-from shoal.mechanics.analysis.evaluate import Evaluator
+from shoal.mechanics.analysis.going_on import as_stated
 from shoal.mechanics.analysis.modes import ABOUT, Modes, modes_at_rest, modes_of_motion
 from shoal.mechanics.analysis.steady import steady_motion
 from shoal.mechanics.machine import Machine
@@ -113,7 +113,7 @@ def campbell(
     speeds = tuple(map(float, speeds))
     if not speeds or not all(np.isfinite(speed) and speed >= 0 for speed in speeds):
         raise InputError(f"speeds: give speeds of at least 0 rad/s, found {', '.join(map(str, speeds)) or 'none'}")
-    evaluator, placement = Evaluator.of(scene), Machine.of(scene).placement
+    evaluator, placement = as_stated(scene), Machine.of(scene).placement
     q, v = (part[:, 0].copy() for part in (evaluator.model.q0, evaluator.model.v0))
     if any(speeds):
         if np.max(np.abs(v), initial=0.0) <= left_out.STILL:

@@ -16,6 +16,7 @@ from shoal.mechanics.analysis import triads
 from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.ended import start_angles
 from shoal.mechanics.frames import BeamFrame
+from shoal.mechanics.machine import Machine
 from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
@@ -44,6 +45,16 @@ def taken_up(model: Model, state: End) -> Model:
     for lane in range(model.lanes if model.varies else 1):
         _check_joints(model, lane)
     return model
+
+
+def as_stated(scene: Scene, *, horizon: float = 0.0) -> Evaluator:
+    """Return an evaluator of a scene where it states its start, be that the end of a run, but before any statics.
+
+    horizon [s]: latest time that will be asked for. Raises InputError if the scene cannot be modelled, or its start as
+    `taken_up` does.
+    """
+    model = Machine.of(scene).model(horizon)
+    return Evaluator(taken_up(model, scene.initial_from) if isinstance(scene.initial_from, End) else model)
 
 
 def _finer(state: End, scene: Scene) -> End:

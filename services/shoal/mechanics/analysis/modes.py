@@ -17,10 +17,12 @@ from shoal.arguments import check, one_of
 from shoal.error_budget import ErrorBudget
 from shoal.errors import ComputationError, InputError
 from shoal.mechanics.analysis import left_out
+from shoal.mechanics.analysis.at_rest import at_start
 from shoal.mechanics.analysis.balance import BALANCED, Balance
 from shoal.mechanics.analysis.damped import small
 from shoal.mechanics.analysis.equilibrium import Equilibrium
 from shoal.mechanics.analysis.evaluate import Evaluator, points
+from shoal.mechanics.analysis.going_on import as_stated
 from shoal.mechanics.analysis.singular import crossing
 from shoal.mechanics.analysis.small_motions import hides, pull
 from shoal.mechanics.analysis.statics import statics
@@ -253,7 +255,7 @@ def modes(
     """
     one_of("about", about, ABOUT)
     check(time=time, count=count)
-    evaluator, moving = Evaluator.of(scene, horizon=time), ""
+    evaluator, moving = (at_start if about == "start" else as_stated)(scene, horizon=time), ""
     if is_moving(evaluator, time):
         q, v = (part[:, 0].copy() for part in (evaluator.model.q0, evaluator.model.v0))
         try:
@@ -270,7 +272,7 @@ def _but_for_gravity(scene: Scene, about: str) -> str:
         return ""
     try:
         weightless = scene.with_values({"gravity": [0.0] * scene.dimensions})
-        evaluator = Evaluator.of(weightless)
+        evaluator = as_stated(weightless)
         q, v = (part[:, 0].copy() for part in (evaluator.model.q0, evaluator.model.v0))
         steady_motion(weightless, Machine.of(weightless).placement, evaluator, q, v, 0.0, seek=about == "equilibrium")
     except (ComputationError, InputError):
@@ -295,7 +297,7 @@ def modes_at_rest(
         if not equilibrium.balanced:
             raise ComputationError(f"{scene.name}: no equilibrium to vibrate about: {equilibrium.message}")
         return modes_about(equilibrium, count=count)
-    evaluator = Evaluator.of(scene, horizon=time)
+    evaluator = at_start(scene, horizon=time)
     q, gap = _balance(scene, evaluator, time).restore(evaluator.model.q0[:, 0].copy())
     if gap > 1e-9:
         raise ComputationError(f"{scene.name}: the joints cannot be closed at the start; they gape by {gap:.2g}")

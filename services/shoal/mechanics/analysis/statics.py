@@ -20,6 +20,7 @@ from shoal.mechanics.analysis.balance import BALANCED, FALLS, Balance, Found, Vi
 from shoal.mechanics.analysis.damped import small
 from shoal.mechanics.analysis.equilibrium import Equilibrium, Held
 from shoal.mechanics.analysis.evaluate import Evaluator, points
+from shoal.mechanics.analysis.going_on import as_stated
 from shoal.mechanics.analysis.idle_spins import idle_spins
 from shoal.mechanics.analysis.joint_reactions import reactions_of
 from shoal.mechanics.analysis.small_motions import LEAST, ROUND, TENSION, hides, pull
@@ -31,6 +32,7 @@ from shoal.mechanics.machine import Machine
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
 from shoal.scene import Attachment, Scene
+from shoal.scene.ended import End
 from shoal.scene.loads import Torque
 
 TURN = 0.8
@@ -61,8 +63,7 @@ def statics(scene: Scene, time: float = 0.0, *, leave_unstable: bool = True) -> 
     machine. The message names neglected effects. Raises InputError if the scene cannot be modelled.
     """
     check(time=time)
-    evaluator = Evaluator.of(scene, horizon=time)
-    return _Search(scene, evaluator, time).run(leave_unstable)
+    return _Search(scene, as_stated(scene, horizon=time), time).run(leave_unstable)
 
 
 class _Search:
@@ -79,7 +80,8 @@ class _Search:
         self.marker_points = points([self.placement.point(scene, at) for at in scene.markers.values()], unknowns)
         self.marker_lines = points([self.placement.direction(scene, at) for at in scene.markers.values()], unknowns)
         angles = start_angle if scene.dimensions == plane.DIMENSIONS else self._start_angle
-        self.angles = np.array([float(angles(scene, at)) for at in scene.markers.values()])
+        known = scene.initial_from.angles if isinstance(scene.initial_from, End) else {}
+        self.angles = np.array([known.get(name, float(angles(scene, at))) for name, at in scene.markers.items()])
         mass = sum(float(body.mass) for body in scene.bodies.values())
         self.balance = Balance(evaluator, time, span(scene), mass)
         self.iterations = self.steps = 0
