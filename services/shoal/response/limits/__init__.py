@@ -1,4 +1,4 @@
-"""What must not happen to a machine: how probable it is, or whether it can, and the run that shows it."""
+"""Structural reliability of a machine: probability of exceeding a limit, or whether interval values can exceed it."""
 
 from shoal.response.limits.judge import MOST, judge
 from shoal.response.limits.judged import Judged, Shown

@@ -167,7 +167,7 @@ def auto(margins: Margins, seed: int) -> Passing:
 
 @dataclass(frozen=True)
 class Searched:
-    """Where a limit is passed.
+    """Failure domain of a limit: its design points and samples of it.
 
     points: design points by runs; proposed: these and those of the response surface; beyond: samples of the failure
     domain; surface: None where there are too few runs for one; ended: whether nothing that is known is left to explain
@@ -312,7 +312,7 @@ def _weak(estimate: Estimate, samples: list[Sample], points: list[DesignPoint], 
 
 
 def _disagree(one: Estimate, name: str, other: Estimate, least: float, told: str, *, both: bool = False) -> str:
-    """Empty, or that another, independent estimate is larger than chance allows, or, for both, smaller.
+    """Return that an independent estimate is larger (or, for `both`, smaller) than chance allows, else "".
 
     least: coefficient of variation of the other at least; told: what it is
     """

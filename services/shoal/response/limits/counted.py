@@ -1,4 +1,4 @@
-"""Whether runs that are drawn from the distributions, which tell a probability without bias, contradict it."""
+"""Binomial test of an estimated probability against plain Monte Carlo runs, which are unbiased."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def contradiction(estimate: Estimate, margins: Array, share: float = 1.0, outsid
 
 
 def ends(estimate: Estimate) -> tuple[float, float]:
-    """Of the interval of 95 % confidence, or about a probability that has none."""
+    """Return the ends of the interval of 95 % confidence, or of one around a probability that has none."""
     lower, upper = (float(end[-1]) for end in estimate.interval)
     if not math.isnan(lower) and not math.isnan(upper):
         return lower, upper

@@ -1,4 +1,4 @@
-"""What a study says of a limit and of the motion, held against each other.
+"""Consistency of the probability of a limit with the mean and standard deviation of its quantity.
 
 The runs that are drawn from the distributions tell a probability without bias, if roughly; and a deviation cannot be
 smaller than what lies beyond a limit makes it.
@@ -21,7 +21,7 @@ from shoal.trajectory import Array
 
 
 def crosschecked(judged: Judged, machine: Machine, values: Array, *, shared: bool) -> Judged:
-    """With the runs that have told mean and deviation, where these tell the limit's quantity.
+    """Test a probability against the runs that estimated mean and standard deviation of the limit's quantity.
 
     values: (runs, columns); shared: whether runs share parameters with others, as those that tell indices do
     """
@@ -56,7 +56,7 @@ def allowing(told: Statistics, machine: Machine, limit: Limit, estimate: Estimat
 
 
 def shifts(limit: Limit, mean: Array, error: Array, estimate: Estimate) -> tuple[Array, Array]:
-    """By how much what lies beyond a limit moves the mean, and the deviation that it makes at least, (instants,) each.
+    """Return the shift of the mean and the least standard deviation that a probability implies, (instants,) each.
 
     With probability p beyond a bound at distance d from the mean that is p d and, by Cantelli's inequality,
     d sqrt(p / (1 - p)); on both sides by Chebyshev's d sqrt(p). mean: told, to within `error`
@@ -72,7 +72,7 @@ def shifts(limit: Limit, mean: Array, error: Array, estimate: Estimate) -> tuple
 
 
 def _columns(machine: Machine, limit: Limit) -> IntArray | None:
-    """Those of a study that tell the quantity of a limit, (instants,); None where none do."""
+    """Return the columns of a study that hold the quantity of a limit, (instants,); None where none do."""
     if limit.quantity not in machine.quantities or limit.place not in machine.scene.markers:
         return None
     _, markers, quantities = machine.columns

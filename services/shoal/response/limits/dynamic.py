@@ -28,7 +28,7 @@ _BODY = "moved-body-"
 
 @dataclass(frozen=True)
 class Telling(GaussEngine):
-    """The native engine, whose motions tell their states."""
+    """The native engine, whose trajectories hold their states."""
 
     def simulate(self, scene: Scene, times: Sequence[float] | Array | None = None, *, whole: bool = True) -> Trajectory:
         """See `GaussEngine`."""
@@ -47,7 +47,7 @@ class Telling(GaussEngine):
 
 
 def asked(engine: Engine, scene: Scene, quantity: str) -> Engine:
-    """An engine whose motions tell a quantity. Raises InputError."""
+    """Return an engine whose trajectories give a quantity. Raises InputError."""
     if not needs_states(quantity, scene):
         return engine
     if not isinstance(engine, GaussEngine):
@@ -56,7 +56,7 @@ def asked(engine: Engine, scene: Scene, quantity: str) -> Engine:
 
 
 def equipped(scene: Scene, quantity: str) -> Scene:
-    """The scene with markers that tell the motion of its bodies, where this is enough."""
+    """Return the scene with markers that give the motion of its bodies, where this is enough."""
     if needs_states(quantity, scene):
         return scene
     markers = {f"{_BODY}{name}": Attachment(body=name, point=(0.0, 0.0)) for name in scene.bodies}
@@ -64,7 +64,10 @@ def equipped(scene: Scene, quantity: str) -> Scene:
 
 
 def along(motion: Trajectory, scene: Scene, values: Mapping[str, Array], quantity: str, place: str) -> Array:
-    """Of an equipped scene from its start, (instants, lanes), nan where a lane failed. Raises InputError.
+    """Return the quantity of an equipped scene from its start, (instants, lanes), nan where a lane failed.
+
+    Raises InputError.
+
 
     values: of the lanes by path
     """

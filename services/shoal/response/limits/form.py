@@ -1,4 +1,4 @@
-"""Where a limit is most probably passed: the nearest places to the origin of the standard normal space (FORM).
+"""First-order reliability method (FORM): design points, the nearest of the limit to the origin of the normal space.
 
 Hasofer and Lind 1974, Rackwitz and Fiessler 1978, with the line search of Zhang and Der Kiureghian, Two improved
 algorithms for reliability analysis, 1995. All starts go side by side. Over time the limit is that of a series system:
@@ -35,7 +35,7 @@ NEGLIGIBLE = 1e-4
 
 @dataclass(frozen=True)
 class DesignPoint:
-    """Where a limit is most probably passed, of all places around.
+    """Design point: the locally most probable point of the failure domain.
 
     place: in the standard normal space, (parameters,); normal: the unit vector of steepest descent of the margin there;
     slope: by how much the margin falls per standard deviation; beta: distance [standard deviations], negative if the
@@ -51,7 +51,7 @@ class DesignPoint:
 
     @property
     def probability(self) -> float:
-        """Of the half space beyond its tangent: the first-order estimate."""
+        """First-order estimate: the probability of the half space beyond the tangent."""
         return float(special.ndtr(-self.beta))
 
 
@@ -86,7 +86,7 @@ def design_points(margins: Margins, starts: Array) -> list[DesignPoint]:
 
 
 def gradients(margins: Margins, u: Array, rows: Array) -> Array:
-    """Of the margin at the instant that decides, by central differences, (places, parameters); 0 where one failed."""
+    """Return gradients of the deciding margin by central differences, (places, parameters); 0 where a run failed."""
     count, parameters = u.shape
     away = STEP * np.eye(parameters)
     beside = np.concatenate([u[:, None] + away, u[:, None] - away], axis=1)

@@ -1,4 +1,4 @@
-"""Importance sampling: runs around the places where a limit is passed, weighted by how much rarer they really are.
+"""Importance sampling of the failure domain by mixtures of normal distributions, with a control variate.
 
 Proposals are mixtures of normal distributions: one around every design point (Melchers, Importance sampling in
 structural systems, Structural Safety 6, 1989), and some for the runs beyond the limit that belong to it, with their
@@ -71,7 +71,7 @@ class Outside:
 
     @property
     def probability(self) -> float:
-        """Of all that lies there."""
+        """Probability of the region."""
         return float(special.gammaincc(len(self.axes) / 2, self.radius**2 / 2))
 
     def draw(self, count: int, random: np.random.Generator) -> Array:
@@ -83,7 +83,7 @@ class Outside:
         return np.asarray(places + (longer[:, None] * along) @ self.axes)
 
     def reaches(self, places: Array) -> BoolArray:
-        """Which of them lie there."""
+        """Return whether places lie in the region, (places,)."""
         return np.asarray(np.linalg.norm(places @ self.axes.T, axis=1) >= self.radius)
 
 
@@ -102,7 +102,7 @@ def outsides(points: list[DesignPoint], beyond: Array) -> list[Outside]:
 
 @dataclass(frozen=True)
 class Mixture:
-    """Of normal distributions, and of what lies outside.
+    """Mixture of normal distributions and of the standard normal one outside a radius.
 
     shares: (parts,), of those that are normal; means: (parts, parameters); factors: Cholesky's, of covariances;
     outside, wide: what lies there, each with its share of all runs
@@ -124,7 +124,7 @@ class Mixture:
         )
 
     def draw(self, count: int, random: np.random.Generator) -> tuple[Array, IntArray]:
-        """As many of each part as its share says, but for rounding, which chance decides, (count, parameters).
+        """Draw stratified places of each component, (count, parameters).
 
         And which part each is of: below 0 those outside, as `outside` is indexed from its end.
         """
@@ -181,12 +181,12 @@ class Sample:
 
     @property
     def estimate(self) -> Estimate:
-        """What they tell."""
+        """Weighted estimate of the probability."""
         return weighted(self.rows, self.weights, f"importance sampling with {len(self.places)} runs")
 
     @property
     def beyond(self) -> Sample:
-        """Of the runs that pass the limit."""
+        """The runs in the failure domain."""
         return self._some(np.asarray((self.rows < 0).any(axis=1)))
 
     def shifted(self, off: Array) -> tuple[float, float, float]:
@@ -206,7 +206,7 @@ class Sample:
 
 
 def sample(margins: Margins, proposal: Mixture, count: int, seed: int) -> Sample:
-    """So many runs. Raises InputError, TooManyRunsError."""
+    """Return `count` weighted runs drawn from a proposal. Raises InputError, TooManyRunsError."""
     places, part = proposal.draw(count, np.random.default_rng(seed))
     rows, ways = margins(places), proposal.outside
     outside = tuple((rows[part == k - len(ways)], way.probability) for k, way in enumerate(ways))
@@ -285,7 +285,7 @@ def _scatter(proposal: Mixture, of: Sample) -> float:
 
 
 def _centres(beyond: Sample, parts: int) -> Array:
-    """Of so many groups of alike weight, by k-means, (at most so many, parameters)."""
+    """Return the centres of at most `parts` clusters of equal weight, by k-means, (centres, parameters)."""
     ends = np.cumsum(beyond.weights) / beyond.weights.sum()
     alike = beyond.places[np.searchsorted(ends[:-1], (np.arange(len(ends)) + 0.5) / len(ends))]
     guess = np.unique(alike, axis=0)
@@ -295,7 +295,7 @@ def _centres(beyond: Sample, parts: int) -> Array:
 
 
 def _fitted(plain: Mixture, beyond: Sample, parts: int, prior: float) -> Mixture:
-    """With parts for each design point, as no single normal distribution follows a limit that bends.
+    """Return a mixture with `parts` components for each design point, which together follow a curved limit.
 
     plain: around the design points, which is what no parts give; prior: for how many observations of a unit covariance
     a part is taken, as few tell little of all directions

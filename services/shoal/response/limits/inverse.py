@@ -1,4 +1,4 @@
-"""Where a limit is nearest at a given distance from the origin of the standard normal space (inverse FORM).
+"""Inverse FORM: the least margin at a given distance from the origin of the standard normal space.
 
 Der Kiureghian, Zhang and Li, Inverse reliability problem, Journal of Engineering Mechanics 120, 1994; the performance
 measure of Tu, Choi and Park, A new study on reliability-based design optimization, Journal of Mechanical Design 121,
@@ -21,7 +21,7 @@ STARTS = 6
 
 @dataclass(frozen=True)
 class Nearest:
-    """Where the margin is least at a distance from the origin; for a negative one, where it is largest.
+    """Most probable point at a given reliability index: the least margin there; for a negative index the largest.
 
     place: in the standard normal space, (parameters,); normal: the unit vector of steepest descent of the margin there,
     0 where nothing changes it; slope: by how much it falls per standard deviation; margin: there; instant: that

@@ -1,4 +1,4 @@
-"""Whether a limit of a machine is kept, or how probable it is to be passed."""
+"""Assessment of a limit of a machine: its probability, or its worst margin over interval values."""
 
 from __future__ import annotations
 
@@ -35,18 +35,18 @@ the germs of the former, (instants, parameters); runs made, and how many failed.
 
 @dataclass(frozen=True)
 class Watch:
-    """Tells the margins of a limit at the last instants of a motion."""
+    """Margins of a limit at the last instants of a trajectory."""
 
     limit: Limit
     instants: int
 
     def margins(self, motion: Trajectory, scene: Scene, values: Mapping[str, Array]) -> Array:
-        """Of every lane, (lanes, instants). Raises InputError."""
+        """Return the margins of every lane, (lanes, instants). Raises InputError."""
         return self.limit.margins(motion, scene, values)[:, -self.instants :]
 
 
 def watched(machine: Machine, limit: Limit) -> Machine:
-    """The same machine, of which the margins of a limit are told."""
+    """Return the machine with the margins of a limit as its answers."""
     told = Watch(limit, len(machine.times)).margins
     return replace(
         machine,
@@ -58,9 +58,7 @@ def watched(machine: Machine, limit: Limit) -> Machine:
 
 
 def require(machine: Machine, limit: Limit, inputs: Inputs) -> None:
-    """Return whether the machine tells a limit, by a run in the middle, as a balance of forces does. Raises
-    InputError.
-    """
+    """Check by a run in the middle that the machine gives the quantity of a limit. Raises InputError."""
     if limit.is_dynamic:
         middle = inputs.values(inputs.germs(np.full((1, len(inputs)), 0.5)))
         watched(replace(machine, keep=None), limit)(middle)

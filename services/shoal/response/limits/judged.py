@@ -1,4 +1,4 @@
-"""What is told of a limit: how probable it is to be passed, or whether it is kept, and the run that shows it."""
+"""Result for a limit: probability or decision, with its known errors, and the verified run that shows it."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ MOST_BEYOND = 0.25
 
 @dataclass(frozen=True)
 class Shown:
-    """A run that shows how a limit is passed, or how close to it the machine comes, made again and verified.
+    """Verified run at the design point or at the worst interval values of a limit.
 
     parameters: name -> value; values: path -> value; time [s]: of the least margin; margin: there; status: of the run;
     errors: of its margins, None where they were not estimated; between [s]: when it passes the limit although it does
@@ -124,7 +124,7 @@ def undecided(beyond: float) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """Of one limit.
+    """Result for one limit.
 
     way: that was asked for; times [s]; passing: of random parameters, else None; kept: of intervals, whether no values
     pass it, None where that is not decided; margin, outer: the least that a run attains, and that any may have with the
@@ -165,7 +165,7 @@ class Judged:
 
     @property
     def note(self) -> str:
-        """What else a user should know, empty if nothing."""
+        """Remark for the user, empty if there is none."""
         if self.shown is not None and self.shown.between is not None:
             return f"the run shown passes it between the instants looked at, at {self.shown.between:.4g} s: state more"
         if not self.estimates or not min(one.probability for one in self.estimates) > NEARLY_SURE:

@@ -47,12 +47,12 @@ class Limit:
 
     @property
     def required(self) -> str:
-        """What must hold."""
+        """Required condition."""
         return self.text if self.is_required else self._on_side(not self.above)
 
     @property
     def excluded(self) -> str:
-        """What must not happen."""
+        """Excluded condition."""
         return self._on_side(self.above) if self.is_required else self.text
 
     @property
@@ -63,14 +63,14 @@ class Limit:
         return f"limit {self.text} (must not happen; required: {self.required})"
 
     def verdict(self, kept: bool | None) -> str:
-        """What intervals have shown: whether no values of the parameters pass it, None where that is not decided."""
+        """Describe a decision in words; kept: whether no interval values exceed the limit, None if undecided."""
         if self.is_required:
             return {True: "holds", False: "is violated", None: "is not decided"}[kept]
         return {True: "is kept", False: "is passed", None: "is not decided"}[kept]
 
     @property
     def event(self) -> str:
-        """What has a probability, as a verb."""
+        """Verb for the event that has a probability."""
         return "is violated" if self.is_required else "is passed"
 
     def _on_side(self, above: bool) -> str:
@@ -79,24 +79,24 @@ class Limit:
 
     @property
     def unit(self) -> str:
-        """Of the bound and the margin."""
+        """Unit of the bound and the margin."""
         return UNITS[self.quantity]
 
     @property
     def is_dynamic(self) -> bool:
-        """Return whether masses and loads tell it, not the motion of a marker alone."""
+        """Return whether the quantity takes masses and loads beside the motion of a marker."""
         return self.quantity not in {**MARKERS[2], **MARKERS[3]}
 
     def scene(self, scene: Scene) -> Scene:
-        """The scene whose motion tells the margins: that one with the markers that it takes."""
+        """Return the scene with the markers that the margins take."""
         return dynamic.equipped(scene, self.quantity) if self.is_dynamic else scene
 
     def engine(self, engine: Engine, scene: Scene) -> Engine:
-        """The engine whose motion tells the margins. Raises InputError."""
+        """Return an engine whose trajectories give the margins. Raises InputError."""
         return dynamic.asked(engine, scene, self.quantity) if self.is_dynamic else engine
 
     def instants(self, times: Array) -> Array:
-        """Those of a motion that tells the margins at `times` [s]: angles are counted from the start."""
+        """Return the instants of a trajectory for margins at `times` [s]: angles are counted from the start."""
         return np.append(0.0, times) if self.is_dynamic and times[0] > 0.0 else times
 
     def tightened(self, off: float) -> Limit:
@@ -104,12 +104,12 @@ class Limit:
         return replace(self, bound=self.bound - off if self.above else self.bound + off)
 
     def margin(self, of: Array) -> Array:
-        """How far the quantity is from the bound, negative beyond it."""
+        """Return the distance of the quantity from the bound, negative beyond it."""
         value = np.abs(of) if self.absolute else of
         return np.asarray(self.bound - value if self.above else value - self.bound)
 
     def margins(self, motion: Trajectory, scene: Scene, values: Mapping[str, Array]) -> Array:
-        """Of every lane at every instant, (lanes, instants). Raises InputError.
+        """Return the margins of every lane at every instant, (lanes, instants). Raises InputError.
 
         scene: that of the motion, see `scene`; values: of its lanes by path
         """
@@ -124,12 +124,12 @@ class Limit:
 
 
 def limit(text: str, scene: Scene) -> Limit:
-    """What must not happen, as a user writes it. Raises InputError."""
+    """Return the limit of an excluded condition such as "B.y < 1". Raises InputError."""
     return _read("limit", text, scene)
 
 
 def requirement(text: str, scene: Scene) -> Limit:
-    """What must hold, as a user writes it: the limit that its opposite is. Raises InputError."""
+    """Return the limit whose opposite is a required condition such as "B.y > 1". Raises InputError."""
     found = _read("require", text, scene)
     return replace(found, above=not found.above, stated="requirement")
 

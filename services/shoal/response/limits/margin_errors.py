@@ -16,7 +16,10 @@ from shoal.trajectory import Array, Trajectory
 
 @dataclass(frozen=True, eq=False)
 class MarginErrors:
-    """Of the margins of one run. budget: the largest over time, by source; over_time: their sum, (instants,)."""
+    """Known errors of the margins of one run.
+
+    budget: the largest over time, by source; over_time: their sum, (instants,)
+    """
 
     budget: ErrorBudget
     over_time: Array = field(default_factory=lambda: np.zeros(1))
@@ -40,7 +43,7 @@ def margin_errors(limit: Limit, verification: Verification | None, instants: int
 
 
 def _error(limit: Limit, deviation: Deviation, bending: bool) -> Array:
-    """Of one source, (instants,). bending: whether the machine has flexible rods"""
+    """Return the error of one source, (instants,). bending: whether the machine has flexible rods"""
     motion = deviation.one
     columns = (*motion.axes, "angle") if len(motion.axes) == 2 else tuple(motion.axes)
     if limit.quantity in columns:

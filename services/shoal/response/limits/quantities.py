@@ -39,12 +39,12 @@ _BENT = ("curvature", "side_curvature", "twist")
 
 
 def of_section(quantity: str, scene: Scene) -> bool:
-    """Return whether a section of a flexible rod tells it."""
+    """Return whether the quantity is of a section of a flexible rod."""
     return quantity in STRAINS or quantity in SECTIONS[scene.dimensions]
 
 
 def needs_states(quantity: str, scene: Scene) -> bool:
-    """Return whether more tells it than the motion of the bodies of a rigid machine in the plane."""
+    """Return whether the quantity takes more than the motion of the bodies of a rigid machine in the plane."""
     if of_section(quantity, scene):
         return True
     dynamic = quantity in ENERGIES or quantity in REACTIONS[scene.dimensions]

@@ -34,7 +34,7 @@ ACCEPTED = 0.44
 
 @dataclass(frozen=True)
 class Levels:
-    """What is found.
+    """Result of subset simulation.
 
     estimate: of the probability; places, margins: of the runs beyond the limit, (runs, parameters) and (runs,
     instants); first: places of the runs of the first level, those with the least margins first, (runs, parameters);
