@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from shoal.mechanics.assembly.placement import place
 from shoal.mechanics.assembly.space.placement import place_in_space
+from shoal.mechanics.assembly.space.rigid_bodies import SpatialBodies
 from shoal.mechanics.joints import CONDITIONS, JointCondition
-from shoal.mechanics.start.closure import Closure
+from shoal.mechanics.start.closure import Closure, Poses
 from shoal.mechanics.term_values import TermValues
 from shoal.scene import Attachment, Resisted, Scene
 
@@ -89,6 +90,43 @@ def test_terms_in_space_have_the_derivatives_of_their_values() -> None:
             [(values.at((q + s)[None])[0] - values.at((q - s)[None])[0])[0] for s in h * np.eye(len(q))], 1
         )
         assert values.jacobian(q[None])[0] == pytest.approx(slope / (2 * h), abs=1e-8)
+
+
+SPATIAL_KINDS: dict[str, dict[str, Any]] = {
+    "revolute": {"axis": [0.3, 1.0, 0.2]},
+    "spherical": {},
+    "universal": {"axis": [1, 0, 0], "second_axis": [0, 1, 0]},
+    "cylindrical": {"axis": [1.0, 0.5, 0.2]},
+    "planar": {"axis": [0.1, 0.2, 1.0], "rotation": "locked"},
+    "weld": {},
+    "slider": {"axis": [1.0, 0.5, 0.2], "rotation": "locked"},
+    "distance": {"length": 0.6},
+    "parallel": {},
+    "perpendicular": {},
+    "driven-angle": {"angle": "0.2 + 0.3*sin(t)", "axis": [0.3, 1.0, 0.2]},
+    "gear": {"ratio": "-1/2"},
+}
+
+
+@pytest.mark.parametrize("kind", SPATIAL_KINDS)
+def test_a_closure_in_space_has_the_derivatives_of_small_turns(kind: str) -> None:
+    sides = {"first": {"body": "a", "point": [0.3, -0.1, 0.2]}, "second": {"body": "b", "point": [-0.2, 0.4, 0.1]}}
+    scene = Scene.parse({
+        "name": kind, "dimensions": 3, "bodies": {"a": SOLID, "b": SOLID},
+        "joints": {"J": {"kind": kind, **sides, **SPATIAL_KINDS[kind]}}, "markers": {"m": {"body": "b"}},
+        "initial": {"a": {"position": [0, 0, 0]}, "b": {"position": [1, 0.4, 0]}},
+    })  # fmt: skip
+    random, h = np.random.default_rng(2), 1e-6
+    none = np.zeros((1, 3, 3))
+    begin = Poses(none + 0.0, np.broadcast_to(np.eye(3), (1, 3, 3, 3)), none[..., 0])
+    poses = begin.moved(random.uniform(-0.3, 0.3, (1, 2, 6)))
+    closure = Closure(scene, poses, bodies=SpatialBodies(scene))
+    slope = np.stack([
+        (closure.rows(poses.moved(step)).gap - closure.rows(poses.moved(-step)).gap)[0] / (2 * h)
+        for step in h * np.eye(12).reshape(12, 1, 2, 6)
+    ], 1)  # fmt: skip
+    assert slope.shape[0] >= 1
+    assert closure.rows(poses).slope[0] == pytest.approx(slope, abs=1e-8)
 
 
 class Midway(Resisted):

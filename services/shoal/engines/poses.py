@@ -10,7 +10,8 @@ from shoal.engines.course import slope_after
 from shoal.errors import InputError
 from shoal.mechanics.assembly.groups import moving
 from shoal.mechanics.reach import span
-from shoal.mechanics.start.closure import Closure, place_of, value_of
+from shoal.mechanics.start.closure import Closure
+from shoal.mechanics.start.rigid_bodies import place_of, value_of
 from shoal.mechanics.start.start import complete
 from shoal.scene import GROUND, Attachment, Scene
 from shoal.trajectory import Array

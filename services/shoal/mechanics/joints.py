@@ -247,6 +247,12 @@ class Aligned(JointCondition):
     second: Attachment
     axis: Vector3 | None
 
+    def constrain(self, name: str, bodies: Any) -> None:
+        """Require both directions across the first body's axis to be across the second's."""
+        axis = 0.0 if self.axis is None else self.axis
+        for vector, form in bodies.across(self.first, axis):
+            bodies.terms.form(name, vector, bodies.line(self.second, axis), form, 0)
+
     def twists(self, motion: Any) -> UnitVectors:
         """Return the torques across the axis; two cables, which have slopes only, hold no other axis than those."""
         if self.axis is not None and motion.is_cable(self.first.body) and motion.is_cable(self.second.body):
@@ -266,7 +272,7 @@ class Square(JointCondition):
 
     def constrain(self, name: str, bodies: Any) -> None:
         """Require the scalar product of both axes to vanish."""
-        one, other = bodies.axis(self.first.body, self.axis), bodies.axis(self.second.body, self.second_axis)
+        one, other = bodies.axis(self.first, self.axis), bodies.axis(self.second, self.second_axis)
         bodies.terms.dot(name, one, other, 0)
 
     def twists(self, motion: Any) -> UnitVectors:
@@ -286,11 +292,11 @@ class InPlane(JointCondition):
     def constrain(self, name: str, bodies: Any) -> None:
         """Require the gap to vanish along the axis."""
         gap = bodies.gap(bodies.scene, self)
-        bodies.terms.dot(name, bodies.axis(self.first.body, self.axis), gap, 1)
+        bodies.terms.dot(name, bodies.axis(self.first, self.axis), gap, 1)
 
     def pushes(self, motion: Any) -> UnitVectors:
         """Return the force across the plane."""
-        return {"normal": motion.held_axis(self.first.body, self.axis)}
+        return {"normal": motion.held_axis(self.first, self.axis)}
 
 
 @dataclass(frozen=True)
@@ -303,10 +309,8 @@ class Hinged(JointCondition):
     axis: Vector3
 
     def constrain(self, name: str, bodies: Any) -> None:
-        """Require the cosine and the sine of the angle about the axis."""
-        flat, towards, ahead = bodies.hinge(self.first, self.second, self.axis)
-        bodies.terms.dot(name, flat, towards, 0, drive=self.angle.through("cos", "neg"))
-        bodies.terms.dot(name, ahead, towards, 0, drive=self.angle.through("sin", "neg"))
+        """Require the angle about the axis."""
+        bodies.keep_hinge(name, self)
 
     def twists(self, motion: Any) -> UnitVectors:
         """Return the torque about the axis."""

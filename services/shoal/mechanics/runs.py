@@ -17,8 +17,8 @@ from shoal.errors import InputError, UnstableStepError
 from shoal.mechanics import plane
 from shoal.mechanics import reach as reaches
 from shoal.mechanics.assembly.groups import start_angle
+from shoal.mechanics.assembly.redundancy import redundant_joints
 from shoal.mechanics.assembly.space import start as spatial
-from shoal.mechanics.assembly.space.redundancy import redundant as redundant_in_space
 from shoal.mechanics.assembly.starts import Starts
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.ended import Ended
@@ -30,7 +30,6 @@ from shoal.mechanics.marched import CLOSENESS, CONSTRAINT_DRIFT, ENERGY_DRIFT, E
 from shoal.mechanics.model import Arrays, Model
 from shoal.mechanics.numerics.tile import SINGLE, WIDE, Array, Tile, stacked, tiles
 from shoal.mechanics.start import start
-from shoal.mechanics.start.redundancy import redundant_joints
 from shoal.mechanics.states import States, split
 from shoal.mechanics.still import Still
 from shoal.mechanics.verdict import Limits
@@ -227,11 +226,9 @@ class Runs:
         scene, model = self.scene, self.model
         if scene.dimensions == 3:
             used = spatial.begun(model.frames, *np.split(begun, 2))
-            redundant = redundant_in_space(scene, begun[: model.unknowns])
-            told = start.facts(scene, used, float(reaches.size(scene))) | {"redundant_joints": list(redundant)}
-            return dict(plain(told))
-        used = start.begun(model.frames, model.scene, *np.split(begun, 2))
-        redundant = () if start.is_direct(scene) else redundant_joints(start.complete(scene).scene)
+        else:
+            used = start.begun(model.frames, model.scene, *np.split(begun, 2))
+        redundant = () if start.is_direct(scene) else redundant_joints(scene, used)
         told = start.facts(scene, used, float(reaches.size(scene))) | {"redundant_joints": list(redundant)}
         return dict(plain(told))
 

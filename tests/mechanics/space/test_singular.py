@@ -6,11 +6,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from shoal.mechanics.assembly.space import redundancy
-from shoal.mechanics.assembly.space.start import place_started
-from shoal.mechanics.numerics.tile import stacked
+from shoal.mechanics.analysis.reactions import reactions
+from shoal.mechanics.assembly import redundancy
+from shoal.mechanics.assembly.build import build
+from shoal.mechanics.assembly.space.start import begun
 from shoal.mechanics.simulate import simulate
-from shoal.scene import Scene
+from shoal.scene import Scene, load_scene
 from shoal_validation.stability.singular_in_space import MACHINES, TURN, linkage
 
 
@@ -80,8 +81,18 @@ def test_what_holds_twice_is_named_at_a_singular_position_too() -> None:
 def test_inverse_iterations_find_the_same_redundant_joints(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """As they do for machines with many constraints."""
     scene = Scene.parse(MACHINES[name][0](0.6))
-    q = stacked(place_started(scene).positions)[:, 0]
-    few = redundancy.redundant(scene, q)
+    model = build(scene)
+    start = begun(model.frames, model.q0[:, 0], model.v0[:, 0])
+    few = redundancy.redundant_joints(scene, start)
     monkeypatch.setattr(redundancy, "DENSE", 0)
     monkeypatch.setattr(redundancy, "SOUGHT", 3)
-    assert redundancy.redundant(scene, q) == few
+    assert redundancy.redundant_joints(scene, start) == few
+
+
+@pytest.mark.parametrize("name", ["n-four-bar-2", "equal-slider-crank"])
+def test_joints_named_as_redundant_are_those_whose_forces_are_not_unique(name: str) -> None:
+    """A machine of the plane holds itself more than it needs to in space, where its hinges hold all parallel axes."""
+    scene = load_scene(name).with_values({"dimensions": 3})
+    run = simulate(scene, np.array([1e-3]))
+    (found,) = reactions(scene, [0.0])
+    assert run.model["redundant_joints"] == list(found.not_unique) == list(scene.joints)

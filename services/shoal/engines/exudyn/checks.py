@@ -9,7 +9,7 @@ import numpy as np
 from shoal.engines.exudyn.build import Machine
 from shoal.engines.exudyn.record import Indices, Record
 from shoal.mechanics.reach import MARGIN, distance_to_ground, reach
-from shoal.mechanics.start.closure import lead
+from shoal.mechanics.start.rigid_bodies import lead
 from shoal.trajectory import Array, Status
 
 LARGEST_GAP = 1e-4

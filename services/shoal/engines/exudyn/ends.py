@@ -11,7 +11,7 @@ from shoal.engines.exudyn.bodies import Holder, Motion, Place, System
 from shoal.engines.exudyn.chain import Chain
 from shoal.engines.poses import InitialPose, owner, start_of
 from shoal.errors import InputError
-from shoal.mechanics.start.closure import lead
+from shoal.mechanics.start.rigid_bodies import lead
 from shoal.scene import Attachment, PointMass, Scene
 from shoal.trajectory import Array
 

@@ -17,7 +17,7 @@ from shoal.engines.exudyn.ground import Coordinate, GroundPart, drive, driven, m
 from shoal.errors import InputError
 from shoal.mechanics.assembly.groups import start_angle
 from shoal.mechanics.joints import Turned, conditions
-from shoal.mechanics.start.closure import value_of
+from shoal.mechanics.start.rigid_bodies import value_of
 from shoal.scene import (
     GROUND,
     Attachment,

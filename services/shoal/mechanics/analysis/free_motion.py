@@ -126,18 +126,18 @@ class FreeMotion:
             return [np.stack([-line[:, 1], line[:, 0]], axis=1)]
         return [one.T for one in turns.across(_unit(line).T)]
 
-    def held_axis(self, body: str, axis: Any) -> Array:
+    def held_axis(self, side: Attachment, axis: Any) -> Array:
         """Return the unit vector of a rigid body or the ground that points along an axis at the start, (samples, 3)."""
-        return self._everywhere(self.value(self._placement.axis(body, axis)))
+        return self._everywhere(self.value(self._placement.axis(side, axis)))
 
     def common_axis(self, first: Attachment, second: Attachment, axis: Any) -> Array:
         """Return an axis that two bodies have in common, as the rigid one has it, or else a section, (samples, 3)."""
         sides = sorted((first, second), key=lambda side: (self._is_rod(side.body), self.is_cable(side.body)))
         return self.axis(sides[0], axis)
 
-    def about(self, body: str, axis: Any) -> Array:
+    def about(self, side: Attachment, axis: Any) -> Array:
         """Return the unit torque about an axis of a rigid body or the ground, (samples, components)."""
-        return self.turns["torque"] if self.turn_axes == 1 else self.held_axis(body, axis)
+        return self.turns["torque"] if self.turn_axes == 1 else self.held_axis(side, axis)
 
     def pin(self, joint: Revolute) -> Array:
         """Return the unit torque about the axis of a hinge, (samples, components)."""
@@ -151,7 +151,7 @@ class FreeMotion:
         None: its x axis. A cable has its slope only; any other axis is that of the start.
         """
         if not self._is_rod(side.body):
-            return self.held_axis(side.body, axis)
+            return self.held_axis(side, axis)
         if not self.is_cable(side.body):
             return self._of_section(side, axis)
         if axis is not None:

@@ -102,7 +102,7 @@ def _geared(motion: FreeMotion, joint: str, condition: Geared) -> Component:
     gradient = np.zeros((len(motion.at), motion.bodies.unknowns))
     torques = []
     for side, axis, factor in zip(condition.sides, condition.axes, condition.factors, strict=True):
-        torques.append(factor * motion.about(side.body, axis))
+        torques.append(factor * motion.about(side, axis))
         gradient += _along(torques[-1], motion.turn(side))
     return Component(joint, "torque", gradient, np.zeros((len(motion.at), motion.dimensions)), torques[0])
 

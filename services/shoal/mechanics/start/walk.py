@@ -10,7 +10,7 @@ from shoal.errors import InputError
 from shoal.mechanics.joints import Along, Apart, JointCondition, Meet, Turned, of_scene, unknown
 from shoal.mechanics.numerics.tile import Array, Number
 from shoal.mechanics.plane import as_complex, phasor
-from shoal.mechanics.start.closure import bending_rate, lead, place_of, rate_of, value_of
+from shoal.mechanics.start.rigid_bodies import bending_rate, lead, place_of, rate_of, value_of
 from shoal.scene import GROUND, Attachment, Function, Scene
 
 Step = tuple[str, Attachment | None, Attachment | None, Number]

@@ -7,21 +7,20 @@ from typing import Any
 import numpy as np
 
 from shoal.errors import InputError
-from shoal.mechanics import rotation as turns
 from shoal.mechanics.affine import Affine, combined, fixed
 from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.assembly.groups import is_stiff, joint_points
 from shoal.mechanics.assembly.space.attitudes import Attitudes
 from shoal.mechanics.assembly.space.axes import joint_axes
+from shoal.mechanics.assembly.space.body_vectors import AttitudeVectors
 from shoal.mechanics.assembly.space.sections import chosen_elements
 from shoal.mechanics.frames import BeamFrame, RigidFrame
-from shoal.mechanics.joints import Aligned, Along, Meet, Square, Turned
+from shoal.mechanics.joints import Aligned, Along, Hinged, Meet, Square, Turned
 from shoal.mechanics.numerics.tile import Array
-from shoal.mechanics.plane import vector
 from shoal.scene import GROUND, Attachment, Scene
 
 
-class SpatialPlacement(Placement):
+class SpatialPlacement(AttitudeVectors, Placement):
     """A placement in space, which knows the attitudes that the scene states, and whom they hold."""
 
     def __init__(self, scene: Scene) -> None:
@@ -37,29 +36,25 @@ class SpatialPlacement(Placement):
         self.chosen: set[tuple[str, int]] = set()
         """Bodies, and which joint points tell how they are turned."""
 
-    def axis(self, body: str, axis: Any) -> Affine:
-        """Return the unit vector of a rigid body or the ground along an axis at the start; None: its x axis."""
-        return self.of_image(body, self.attitudes.image(body, axis))
-
-    def of_image(self, body: str, image: Any) -> Affine:
+    def of_image(self, side: Attachment, image: Any) -> Affine:
         """Return the vector of a rigid body or the ground with these components in its frame. Raises InputError."""
-        if body == GROUND:
+        if side.body == GROUND:
             return fixed(image)
-        if not isinstance(self.frames[body], RigidFrame):
-            raise InputError(f"{body} is flexible; in space only a rigid body holds an axis, a line or an angle")
-        return combined(self.attitudes.kept.of_body(body), tuple(image))
+        if not isinstance(self.frames[side.body], RigidFrame):
+            raise InputError(f"{side.body} is flexible; in space only a rigid body holds an axis, a line or an angle")
+        return combined(self.attitudes.kept.of_body(side.body), tuple(image))
 
-    def line(self, first: Attachment, direction: Any) -> Affine:
-        """Return the unit vector of a line that a body holds: an axis at the start, or an angle in its frame."""
-        return self.of_image(first.body, self._image_of_line(first.body, direction))
+    def of_axis(self, side: Attachment, image: Any) -> Affine:
+        """Return the same, of a rod its slope."""
+        if isinstance(self.frames.get(side.body), BeamFrame):
+            return self.direction(self.scene, side)
+        return self.of_image(side, image)
 
-    def _image_of_line(self, body: str, along: Any) -> Array:
-        return self.attitudes.image(body, along) if isinstance(along, tuple) else turns.about_z(along)[:, 0]
-
-    def across(self, first: Attachment, direction: Any) -> list[tuple[Affine, Array]]:
-        """Vectors at right angles to a line that a body holds, with the form of the scalar product."""
-        image = self._image_of_line(first.body, direction)
-        return [(self.of_image(first.body, normal), np.eye(3)) for normal in turns.across(image)]
+    def keep_hinge(self, name: str, condition: Hinged) -> None:
+        """Require the cosine and the sine of an angle about an axis."""
+        flat, towards, ahead = self.hinge(condition.first, condition.second, condition.axis)
+        self.terms.dot(name, flat, towards, 0, drive=condition.angle.through("cos", "neg"))
+        self.terms.dot(name, ahead, towards, 0, drive=condition.angle.through("sin", "neg"))
 
     def shares(self, condition: Any, is_weld: bool) -> bool:
         """Return whether the coordinates satisfy a condition by themselves, or further terms hold it."""
@@ -69,33 +64,15 @@ class SpatialPlacement(Placement):
             return not condition.held
         return isinstance(condition, Turned | Aligned) or (isinstance(condition, Along) and condition.is_fixed)
 
-    def hinge(self, first: Attachment, second: Attachment, axis: Any) -> tuple[Affine, Affine, Affine]:
-        """Return directions at right angles to an axis: of the first, of the second, and the first's turned by 90 deg.
-
-        Both are images of the bodies' x axes, or of another where that is along the axis.
-        """
-        found = []
-        for side in (first, second):
-            image = self.attitudes.image(side.body, axis)
-            along = np.eye(3)[0 if np.all(np.abs(image[0]) < 0.9) else 1][:, None]
-            flat = turns.unit(along - image * np.sum(image * along, axis=0))
-            found.append((side.body, image, flat))
-        (body, image, flat), (other, _, there) = found
-        is_rod = isinstance(self.frames.get(other), BeamFrame)
-        towards = self.direction(self.scene, second) if is_rod else self.of_image(other, there)
-        return self.of_image(body, flat), towards, self.of_image(body, turns.cross(image, flat))
-
     def angle(self, name: str, side: Attachment, axis: Any) -> Affine:
         """Return a unit vector across an axis at rest, in coordinates whose third axis that is. Raises InputError."""
         if not isinstance(self.frames[side.body], RigidFrame):
             raise InputError(f"joints.{name}: turns {side.body}, which is not rigid; weld a rigid body to it instead")
-        if not self.axis(side.body, axis).rests:
+        if not self.axis(side, axis).rests:
             told = ", ".join(f"{np.ravel(part)[-1]:g}" for part in axis)
             kind = self.scene.joints[name].kind
             raise InputError(
                 f"joints.{name}: {side.body} does not turn about an axis at rest, ({told}) at the start; a {kind} in "
                 "space turns on hinges whose axes the ground holds"
             )
-        across = self.of_image(side.body, turns.across(self.attitudes.image(side.body, axis))[0])
-        one, other = turns.across(turns.unit(vector(*axis)))
-        return across.turned(np.stack(np.broadcast_arrays(one, other, turns.cross(one, other))))
+        return super().angle(name, side, axis)

@@ -8,14 +8,13 @@ dependence is large for the digits of the numbers.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from decimal import Decimal
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from shoal.errors import InputError
-from shoal.mechanics.assembly.space.redundancy import SHARE, joints_of
 from shoal.mechanics.assembly.space.values import uncancelled
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.term_values import TermValues
@@ -36,6 +35,8 @@ _WAY = 0.05
 _SAME = 10.0
 """The joints may gape there by so many times what they do to first order."""
 _ITERATIONS = 20
+_SHARE = 1e-3
+"""Part in a dependence, squared, from which a row counts as one of those that make it."""
 
 
 def require_unlocked(scene: Scene, terms: Sequence[Term], q: Array) -> None:
@@ -60,6 +61,14 @@ def require_unlocked(scene: Scene, terms: Sequence[Term], q: Array) -> None:
             f"joints.{first}: {beside} forbids a motion by {found.off:.1g} rad, as rounded axes, rotations or places "
             "do; state them with more digits"
         )
+
+
+def joints_of(scene: Scene, names: Collection[str]) -> tuple[str, ...]:
+    """The joints that rows are of, by the names of joints, or of bodies, which their joints hold."""
+    held = {*names}
+    return tuple(
+        name for name, joint in scene.joints.items() if name in held or held & {side.body for side in places(joint)}
+    )
 
 
 def _rounding(scene: Scene, names: Iterable[str]) -> float:
@@ -97,7 +106,7 @@ def lock(gap: Callable[[Array], Array], slope: Callable[[Array], Array], q: Arra
         depends = np.any(np.linalg.svd(slope(there), compute_uv=False) < _SAME * sizes[k])
         moved = float(np.linalg.norm(there - q))
         if gapes < _SAME * sizes[k] * _WAY and depends and moved > _WAY / 2:
-            return Lock(np.flatnonzero(np.abs(left[:, k]) > np.sqrt(SHARE)).tolist(), float(sizes[k]))
+            return Lock(np.flatnonzero(np.abs(left[:, k]) > np.sqrt(_SHARE)).tolist(), float(sizes[k]))
     return None
 
 

@@ -54,7 +54,7 @@ def along(scene: Scene, name: str, result: SpatialPlacement, side: Attachment, i
 def unit(scene: Scene, name: str, result: SpatialPlacement, side: Attachment, image: Array) -> Affine:
     """The unit vector that the frame of a body, or of a rod's section at a place, has so. Raises InputError."""
     if is_stiff(scene, side.body):
-        return result.of_image(side.body, image)
+        return result.of_image(side, image)
     found = director_of(scene, name, result, side)
     if found is None:
         raise InputError(
