@@ -9,6 +9,10 @@ Parts that several processes compiled meet in one module, by their names. Numba 
 enclose different values by a number that every process counts from 1: the sum of two vectors would become the product
 that another process has under this number. Here each process counts from a random number.
 
+Numba also lets a function take over `forceinline` from the caller that happens to compile it first, and all that it
+calls from there: large functions would be copied to every place that calls them, or not, as the order has it. Here
+only those are always inlined that say so themselves; of the others LLVM decides.
+
 Numba offers no setting for this: private names of version 0.68 are replaced.
 """
 
@@ -65,6 +69,7 @@ def install() -> None:
 
     def customize_flags(self: Any, flags: Any) -> Any:
         flags = numbas_flags(self, flags)
+        flags.forceinline = bool(self.targetoptions.get("forceinline"))
         if _depth > 1:
             flags.no_cpython_wrapper = flags.no_cfunc_wrapper = True
         return flags

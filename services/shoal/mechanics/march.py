@@ -90,7 +90,7 @@ def loop(place):  # type: ignore[no-untyped-def]
     ending = times[-1] if free or (last >= 0 and halts.times[last] == times[-1]) else steps * step
     snap = RESOLUTION * ending
     check_every = CHECK_EVERY if free else max(1, steps // CHECKS)
-    now, taken, number, cuts, sample, halt, whole = 0.0, step, 0, 0, 0, 0, True
+    now, taken, number, cuts, sample, halt, whole = 0.0, step, 0, 0, np.int64(0), 0, True  # see `branch.follow`
     while True:
         slack = 1e-9 * (taken if free else step)
         while sample < len(times) and times[sample] <= now + slack:
@@ -240,16 +240,18 @@ def _advance(
     if watched:
         derive(tile, m.derived, w.z, m.unknowns, m.force_rows, False)
         elongations(tile, m.forces, w.z, w.memory, w.element, k.elongation)
-    taken = advance(tile, scheme, m, w, now, rest)
-    while watched and taken > snap:
+    taken = rest
+    while True:  # one call of `advance`, as the compiler puts the whole step of the integrator in place of each
+        taken = advance(tile, scheme, m, w, now, taken)
+        if not watched or taken <= snap:
+            return taken
         derive(tile, m.derived, w.z, m.unknowns, m.force_rows, False)
         if not leapt(tile, m.forces, halts, k.elongation, w.z, w.memory, w.element):
-            break
+            return taken
         for i in range(end):
             w.z[i], w.zdot[i], w.a[i] = k.past[i], k.past[end + i], k.past[2 * end + i]
         restart(scheme)
-        taken = advance(tile, scheme, m, w, now, 0.5 * taken)
-    return taken
+        taken *= 0.5
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)

@@ -63,6 +63,8 @@ def follow(
     Returns the new rank, and whether no branch passes: then nothing accelerates but along the constraints.
     """
     width, n = len(tile), m.unknowns
+    # Numbers of any value: Numba would compile `_rows` once for each constant that it is called with.
+    velocity, approaching = np.int64(VELOCITY), np.bool_(True)
     speed = 0.0
     for i in range(n):
         w.branch[i * width + lane] = v[i * width + lane]
@@ -70,17 +72,17 @@ def follow(
     if speed > 0.0:
         for k in range(m.constraints.size):
             s.shift[k] = 0.0
-        rank, off = _rows(tile, m, w, s, t, lane, first, VELOCITY, True, s.shift)
+        rank, off = _rows(tile, m, w, s, t, lane, first, velocity, approaching, s.shift)
         if rank == first and off <= ON_CONE:
             return first, False  # redundant everywhere
-        rank, off = _approach(tile, m, w, s, t, lane, first, VELOCITY)
+        rank, off = _approach(tile, m, w, s, t, lane, first, velocity)
         away = _difference(width, n, lane, w.branch, v)
         if off > ON_CONE or away > AWAY * speed:
             _accelerate(tile, m, w, s, forces, lane, first)
             if speed * speed < tolerance * _largest(width, n, lane, w.extra):
                 speed = 0.0
         if speed > 0.0:
-            rank, _ = _rows(tile, m, w, s, t, lane, first, VELOCITY, False, s.wanted)
+            rank, _ = _rows(tile, m, w, s, t, lane, first, velocity, not approaching, s.wanted)
             return rank, False
     _accelerate(tile, m, w, s, forces, lane, first)
     size = _largest(width, n, lane, w.extra)
@@ -110,14 +112,14 @@ def _settle(
     Returns the rank with its rows, and how far from the cone it is; infinite where it accelerates by less than `least`.
     """
     width, n = len(tile), m.unknowns
-    rank, off = first, 0.0
+    rank, off, order = first, 0.0, np.int64(ACCELERATION)
     for _ in range(ROUNDS):
         for i in range(n):
             w.branch[i * width + lane] = w.extra[i * width + lane]
-        rank, off = _approach(tile, m, w, s, t, lane, first, ACCELERATION)
+        rank, off = _approach(tile, m, w, s, t, lane, first, order)
         if off > ON_CONE or rank == first:
             break
-        rank, _ = _rows(tile, m, w, s, t, lane, first, ACCELERATION, False, s.wanted)
+        rank, _ = _rows(tile, m, w, s, t, lane, first, order, np.bool_(False), s.wanted)
         _accelerate(tile, m, w, s, forces, lane, rank)
         size = _largest(width, n, lane, w.extra)
         if not size > least:
@@ -149,7 +151,7 @@ def _approach(
         for k in range(m.constraints.size):
             s.shift[k] = 0.0
         before = off
-        rank, off = _rows(tile, m, w, s, t, lane, first, order, True, s.shift)
+        rank, off = _rows(tile, m, w, s, t, lane, first, order, np.bool_(True), s.shift)
         if rank == first or off <= ROUND_OFF or (number > 0 and off <= projection.NEW and off > 0.1 * before):
             break
         for i in range(n):

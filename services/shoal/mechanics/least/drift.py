@@ -160,6 +160,6 @@ def _move(tile: Tile, m: Arrays, w: GaussWork, tolerance: float) -> None:
         rank = projection.orthonormalise(s.rows, s.triangle, s.norms, s.order, SETTLING * tolerance)
         projection.components(rank, s.triangle, s.norms, s.order, s.weights, s.wanted)
         projection.move(rank, s.rows, s.wanted, s.y)
-        lent.take_back_from_lane(tile, m, w, s, lane, rank, True)
+        lent.take_back_from_lane(tile, m, w, s, lane, rank, np.bool_(True))
         for i in range(m.unknowns):
             w.extra[i * width + lane] = s.y[i]

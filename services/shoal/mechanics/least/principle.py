@@ -6,6 +6,7 @@ minimiser is found is one of METHODS; `projection` is the default and the only o
 
 from __future__ import annotations
 
+import numpy as np
 from numba import njit
 
 from shoal.compile.simd import EIGHT
@@ -113,7 +114,7 @@ def constrain(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array,
             s.wanted[:] = 0.0
             alternatives.prepare(m.method, s.rows, s.triangle, s.norms)
             alternatives.correct(m.method, s.rows, s.weights, s.triangle, s.norms, s.wanted, s.y)
-            lent.take_back_from_lane(tile, m, w, s, lane, 0, orthogonal)
+            lent.take_back_from_lane(tile, m, w, s, lane, np.int64(0), orthogonal)
             for k in range(count):
                 s.weights[k] = s.wanted[k] * s.norms[k]
         for i in range(m.unknowns):

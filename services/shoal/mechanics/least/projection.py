@@ -158,7 +158,8 @@ def take_out(rank: int, rows: Array, change: Array, y: Array) -> None:
 @njit(cache=True, error_model="numpy")
 def confine(rank: int, rows: Array, y: Array, room: Array) -> None:
     """Take out of y what is not along the basis; room: (unknowns,)."""
-    room[:] = y
+    for i in range(rows.shape[1]):  # `room[:] = y` would compile a message for arrays of other shapes
+        room[i] = y[i]
     for j in range(rank):
         part = dot(rows[j], room)
         for i in range(rows.shape[1]):
