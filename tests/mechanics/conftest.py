@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 from numba import njit
+from shoal.compile.function_pointers import call
 from shoal.compile.pointers import pointer, raw
 from shoal.mechanics import constraints
-from shoal.mechanics import kernels as compiled
-from shoal.mechanics.least import drift
+from shoal.mechanics.analysis import evaluations
 from shoal.mechanics.numerics import sparse
 
 Array = Any
@@ -42,27 +42,27 @@ def bias(tile, held, drives, t, v, out):
     constraints.bias(tile, raw(held), raw(drives), t, pointer(v), pointer(out))
 
 
-@njit(cache=True)
 def acceleration(tile, arrays, room, tolerance):
     """The acceleration of the state in `room`, into room.a."""
-    m, w = raw(arrays), raw(room)
-    compiled.enter(m, w)
-    compiled.acceleration(tile, m, w, 0.0, w.z, w.zdot, tolerance, w.a)
+    evaluations.enter(arrays, room)
+    evaluations.accelerate(tile, arrays, room, 0.0, tolerance)
 
 
-@njit(cache=True)
 def force(tile, arrays, room):
     """The generalised force of the state in `room`, into room.a."""
-    m, w = raw(arrays), raw(room)
-    compiled.enter(m, w)
-    compiled.force(tile, m, w, 0.0, w.z, w.zdot, w.a)
+    evaluations.enter(arrays, room)
+    evaluations.look(tile, arrays, room, 0.0)
+
+
+def project(tile, arrays, room, tolerance):
+    """Make the state in `room` consistent."""
+    evaluations.enter(arrays, room)
+    _settle(arrays.table.settle, tile, arrays.storage, room.storage, tolerance)
 
 
 @njit(cache=True)
-def project(tile, arrays, room, tolerance):
-    """Make the state in `room` consistent."""
-    w = raw(room)
-    drift.project(tile, raw(arrays), w.gauss, 0.0, w.z, w.zdot, tolerance, 3, False)
+def _settle(address, tile, arrays, room, tolerance):
+    call(address, (tile, pointer(arrays), pointer(room), 0.0, tolerance, 3, False))
 
 
 @pytest.fixture(scope="session")

@@ -6,31 +6,40 @@ from typing import Any
 
 import numpy as np
 from numba import njit
+from shoal.compile.function_pointers import call
 from shoal.compile.pointers import pointer, raw
-from shoal.mechanics.elements import families
+from shoal.mechanics import kernels
 
 
-@njit(cache=True)
 def force(tile, family, z, zdot, f, w, power):
-    families.add_force(tile, raw(family), pointer(z), pointer(zdot), pointer(f), pointer(w), pointer(power), True)
+    _force(_kernel("force", tile, family), tile, family, z, zdot, f, w, power)
 
 
-@njit(cache=True)
 def energy(tile, family, z, w, out):
-    families.add_energy(tile, raw(family), pointer(z), pointer(w), pointer(out), 0)
+    _rows(_kernel("energy", tile, family), tile, family, z, w, out)
 
 
-@njit(cache=True)
 def tangent(tile, family, z, w, out):
-    families.tangent(tile, raw(family), pointer(z), pointer(w), pointer(out), 0)
+    _rows(_kernel("stiffness", tile, family), tile, family, z, w, out)
+
+
+def matrix(tile, family, viscous, z, w, out):
+    _rows(_kernel("damping" if viscous else "stiffness", tile, family), tile, family, z, w, out)
+
+
+def _kernel(name, tile, family):
+    """The address of a kernel that machines of such elements call."""
+    return kernels._address(name, tile, family)
 
 
 @njit(cache=True)
-def matrix(tile, family, viscous, z, w, out):
-    if viscous:
-        families.damping(tile, raw(family), pointer(z), pointer(w), pointer(out), 0)
-    else:
-        families.tangent(tile, raw(family), pointer(z), pointer(w), pointer(out), 0)
+def _force(address, tile, family, z, zdot, f, w, power):
+    call(address, (tile, raw(family), pointer(z), pointer(zdot), pointer(f), pointer(w), pointer(power), True))
+
+
+@njit(cache=True)
+def _rows(address, tile, family, z, w, out):
+    call(address, (tile, raw(family), pointer(z), pointer(w), pointer(out), 0))
 
 
 def differences(function: Any, z: Any, h: float) -> Any:

@@ -7,8 +7,6 @@ from typing import Any
 import element_doors as doors
 import numpy as np
 import pytest
-from numba import njit
-from shoal.compile.pointers import pointer, raw
 from shoal.mechanics.dynamics import ELEMENT_ROOM
 from shoal.mechanics.elements import director, families
 from shoal.mechanics.numerics.tile import SINGLE, WIDE, packed
@@ -17,12 +15,6 @@ from shoal.scene.sections import Rectangle
 YOUNG, SHEAR, HEIGHT, WIDTH, LENGTH = 2e8, 7.5e7, 0.04, 0.02, 0.5
 SECTION = Rectangle(HEIGHT, WIDTH)
 REST = (0.1, 0.2, -0.1, 0.05, 0.1, 0.3, 0.01, -0.02, 0.005)
-
-
-@njit(cache=True)
-def _door(tile, family, z, f, w, energy):
-    families.add_force(tile, raw(family), pointer(z), pointer(z), pointer(f), pointer(w), pointer(energy), True)
-    families.add_energy(tile, raw(family), pointer(z), pointer(w), pointer(energy), 0)
 
 
 def _elements(free: tuple[float, ...], count: int = 1, *, tile: Any = SINGLE) -> Any:
@@ -36,8 +28,10 @@ def _elements(free: tuple[float, ...], count: int = 1, *, tile: Any = SINGLE) ->
 
 
 def _evaluate(z: Any, free: tuple[float, ...] = (0.0,) * 9) -> tuple[float, Any]:
-    f, energy = np.zeros(z.size), np.zeros(1)
-    _door(SINGLE, _elements(free, z.size // 18), z.ravel().copy(), f, np.zeros(ELEMENT_ROOM), energy)
+    f, energy, at, room = np.zeros(z.size), np.zeros(1), z.ravel().copy(), np.zeros(ELEMENT_ROOM)
+    rods = _elements(free, z.size // 18)
+    doors.force(SINGLE, rods, at, at, f, room, energy)
+    doors.energy(SINGLE, rods, at, room, energy)
     return float(energy[0]), f.reshape(z.shape)
 
 
@@ -115,7 +109,9 @@ def test_lanes_equal_singles() -> None:
     states = np.array([_state(seed) for seed in range(width)])
     forces, energies = np.zeros((18, width)), np.zeros(width)
     z = np.ascontiguousarray(states.reshape(width, 18).T).ravel()
-    _door(WIDE, _elements(REST, tile=WIDE), z, forces.reshape(-1), np.zeros(64 * width), energies)
+    rods, room = _elements(REST, tile=WIDE), np.zeros(64 * width)
+    doors.force(WIDE, rods, z, z, forces.reshape(-1), room, energies)
+    doors.energy(WIDE, rods, z, room, energies)
     for lane, state in enumerate(states):
         energy, force = _evaluate(state, REST)
         np.testing.assert_allclose(forces[:, lane], force.ravel(), atol=1e-13 * np.abs(force).max())

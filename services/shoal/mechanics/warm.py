@@ -24,16 +24,17 @@ from shoal.compile.locks import SECONDS, described
 from shoal.compile.progress import Note, reporting_to
 from shoal.errors import ShoalError
 from shoal.mechanics import kernels
+from shoal.mechanics.analysis import evaluations
 from shoal.mechanics.assembly.build import build
 from shoal.mechanics.dynamics import work_space
 from shoal.mechanics.integrators import INTEGRATORS, choose, facts, halting
 from shoal.mechanics.march import loop
 from shoal.mechanics.marched import frame_type, framed
-from shoal.mechanics.numerics.tile import tiles
+from shoal.mechanics.numerics.tile import SINGLE, tiles
 from shoal.mechanics.simulate import simulate
 from shoal.scene import Scene, load_scene
 
-USUAL = ("dop853", "leapfrog")
+USUAL = ("dop853", "leapfrog", "generalized-alpha")
 """Integrators that `auto` chooses for most machines: their kernels in space are compiled ahead, those of others when
 they are first used."""
 
@@ -60,9 +61,9 @@ class Kernel(NamedTuple):
 def warm(integrators: Iterable[str] = tuple(INTEGRATORS), note: Note = lambda _: None, *, every: bool = True) -> float:
     """Compile kernels that the cache lacks, on all cores, and load them; return the time [s].
 
-    every: for any scene, with constraints and all families of elements, for usual integrators in space too; else for
-    planar cables that hang together. The first integrator comes with the kernels of the mechanics, which the others
-    share. `note` takes lines of progress.
+    every: for any scene, with constraints and all families of elements, for statics, modes and reactions, and for usual
+    integrators in space too; else for planar cables that hang together. The first integrator comes with the kernels of
+    the mechanics, which the others share. `note` takes lines of progress.
     """
     begin = time.perf_counter()
     first, *others = integrators
@@ -152,11 +153,13 @@ def required(scene: Scene, lanes: int, *, every: bool = False) -> list[Kernel]:
     shared = [Kernel(kernel.__name__, kinds) for kernel, kinds in kernels.signatures(tile, arrays, room, every=every)]
     if lanes > 1 and not every:  # lanes mostly differ in their start alone, and share one stability limit
         shared = [kernel for kernel in shared if kernel.name != "_stiffness"]
+    if every and tile == SINGLE:  # statics, modes and reactions
+        shared += [Kernel(kernel.__name__, kinds) for kernel, kinds in evaluations.signatures(tile, arrays, room)]
     return [Kernel(loop.__name__, (frame_type(frame),)), *shared]
 
 
 def _function(name: str) -> Any:
-    return loop if name == loop.__name__ else getattr(kernels, name)
+    return loop if name == loop.__name__ else getattr(kernels, name, None) or getattr(evaluations, name)
 
 
 def _compile(kernel: Kernel) -> str:

@@ -9,14 +9,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.sparse
 
+from shoal.compile import structures
 from shoal.mechanics import forces, functions, plane
 from shoal.mechanics.affine import Affine
-from shoal.mechanics.analysis import evaluations, stored
+from shoal.mechanics.analysis import evaluations
 from shoal.mechanics.analysis.load_stiffness import driven, in_plane, in_space, of_drives
 from shoal.mechanics.dynamics import derived_rows, work_space
 from shoal.mechanics.elements.families import KERNELS
@@ -99,6 +100,7 @@ class Evaluator:
         self._arrays = model.tile(SINGLE, slice(lane, lane + 1))
         self._room = work_space(SINGLE, self._arrays)
         self._arrays = ready(SINGLE, self._arrays, self._room)
+        evaluations.enter(self._arrays, self._room)
         self._enter(model.q0[:, lane % model.q0.shape[1]], None)
         derived_rows(SINGLE, self._arrays, self._room)
         start = model.start_angles[:, lane % model.start_angles.shape[1]]
@@ -141,9 +143,7 @@ class Evaluator:
         self._enter(q, v)
         arrays, room, n = self._loaded(load), self._room, self.model.unknowns
         held = arrays.constraints
-        gap, rate, bias = (np.zeros(held.size) for _ in range(3))
-        entries = np.zeros(len(held.column))
-        evaluations.look(SINGLE, arrays, room, t, gap, rate, bias, entries)
+        gap, rate, bias, entries = evaluations.look(SINGLE, arrays, room, t)
         force = room.a[:n].copy()
         kinetic, strain, gravity = (float(part) for part in room.energy[:3])
         applied = self._applied(arrays, t)
@@ -164,15 +164,27 @@ class Evaluator:
         is, or -1, (poses,); v, (samples, unknowns), and times [s]: of the samples
         """
         a, turns = np.empty_like(v), np.empty((len(v), len(self._room.memory)))
+        n, tolerance = self.model.unknowns, self.model.scene.solver.rank_tolerance
         self._enter(way[0], None)
-        tolerance = self.model.scene.solver.rank_tolerance
-        evaluations.along(SINGLE, self._arrays, self._room, way, sample, v, times, tolerance, a, turns)
+        for k, number in enumerate(sample.tolist()):
+            self._room.z[:n] = way[k]
+            if k > 0:
+                evaluations.remember(SINGLE, self._arrays, self._room)
+            if number >= 0:
+                self._room.zdot[:n] = v[number]
+                turns[number] = self._room.memory
+                evaluations.accelerate(SINGLE, self._arrays, self._room, float(times[number]), tolerance)
+                a[number] = self._room.a[:n]
         return a, turns
 
     def stored(self, way: Array, turns: Array) -> Array:
         """Strain energy [J] at poses, (poses, unknowns), at which angle forces have counted `turns`, (poses,)."""
         energy = np.empty(len(way))
-        stored.stored(SINGLE, self._arrays, self._room, way, turns, energy)
+        for k, pose in enumerate(way):
+            self._room.z[: self.model.unknowns] = pose
+            self._room.memory[:] = turns[k]
+            evaluations.energies(SINGLE, self._arrays, self._room)
+            energy[k] = self._room.energy[1]
         return energy
 
     def force(self, q: Array, v: Array, t: float = 0.0) -> Array:
@@ -201,7 +213,7 @@ class Evaluator:
         if not dry:
             law = arrays.forces.law.copy()
             law[forces.COULOMB :: forces.LAW] = 0.0
-            arrays = arrays._replace(forces=arrays.forces._replace(law=law))
+            arrays = self._changed(forces=arrays.forces._replace(law=law))
         return sparse.matrix(self._tangent.pattern, damping_at(SINGLE, arrays, self._tangent, self._room))
 
     def strain_energies(self, q: Array) -> dict[str, float]:
@@ -235,7 +247,7 @@ class Evaluator:
         law = arrays.forces.law.copy()
         law[forces.AMPLITUDE :: forces.LAW] *= load
         applied = arrays.applied
-        return arrays._replace(
+        return self._changed(
             weight=arrays.weight * load,
             forces=arrays.forces._replace(law=law),
             applied=applied._replace(
@@ -258,19 +270,23 @@ class Evaluator:
         law[forces.SPEED :: forces.LAW] = 1.0
         none = np.full_like(arrays.forces.table, -1)
         applied = arrays.applied
-        return arrays._replace(
+        return self._changed(
             weight=0.0 * arrays.weight,
             elements=tuple(families),
             forces=arrays.forces._replace(law=law, table=none, energy=none),
             applied=applied._replace(coefficient=0.0 * applied.coefficient, factor=0.0 * applied.factor, share=0.0),
         )
 
+    def _changed(self, **parts: Any) -> Arrays:
+        """The arrays with other parts, in storage of their own."""
+        arrays = self._arrays._replace(storage=structures.storage(), **parts)
+        evaluations.enter(arrays, self._room)
+        return arrays
+
     def _force(self, q: Array, v: Array | None, arrays: Arrays, t: float = 0.0) -> Array:
         """The force of chosen parts; their energies are left in the room."""
         self._enter(q, v)
-        gap, rate, bias = (np.zeros(arrays.constraints.size) for _ in range(3))
-        entries = np.zeros(len(arrays.constraints.column))
-        evaluations.look(SINGLE, arrays, self._room, t, gap, rate, bias, entries)
+        evaluations.look(SINGLE, arrays, self._room, t)
         return self._room.a[: self.model.unknowns].copy()
 
     def _energy(self, q: Array, arrays: Arrays) -> float:

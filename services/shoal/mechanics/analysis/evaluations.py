@@ -1,81 +1,129 @@
-"""The compiled kernels behind `evaluate`: what of a state is asked for, one call each."""
+"""The compiled kernels behind `evaluate`: what of a state is asked for, one call each, by the address of the kernel.
+
+A kernel that Python hands the structures themselves unpacks some three hundred arrays at every call, by code that takes
+longer to compile than what it calls. Here they are written where kernels read them, once.
+"""
 
 from __future__ import annotations
 
-from numba import njit
+from typing import Any
 
-from shoal.compile.pointers import pointer, raw
-from shoal.mechanics import constraints, kernels
+import numpy as np
+from numba import njit, typeof, types
+
+from shoal.compile import function_pointers, structures
+from shoal.compile.pointers import pointer, raw_type, shift
+from shoal.compile.structures import load
+from shoal.mechanics import constraints, dynamics, kernels
 from shoal.mechanics.derived import derive
 from shoal.mechanics.dynamics import Work
-from shoal.mechanics.dynamics import remember as count
 from shoal.mechanics.model import Arrays
-from shoal.mechanics.numerics.tile import Array, Index, Tile
+from shoal.mechanics.numerics.tile import Array, Tile
+
+_NOTHING = np.zeros(1)
+_ADDRESSES: dict[tuple[Any, ...], int] = {}
+
+
+def enter(arrays: Arrays, room: Work) -> None:
+    """Write both structures where kernels read them; at first, and whenever one of their arrays is another."""
+    structures.write(arrays.storage, arrays)
+    structures.write(room.storage, room)
+
+
+def look(tile: Tile, arrays: Arrays, room: Work, t: float) -> tuple[Array, Array, Array, Array]:
+    """Force (into room.a) and energies (room.energy) of the state in `room`, and its constraints.
+
+    Returns residual, C_t, C_qq v v + C_tt, each (constraints, lanes), and the entries of C_q, flat.
+    """
+    width, count = len(tile), arrays.constraints.size
+    ends = np.cumsum([count * width] * 3)
+    out = np.zeros((3 * count + len(arrays.constraints.column)) * width)
+    _run(_look, tile, arrays, room, t, 0.0, out)
+    residual, rates, bias, jacobian = np.split(out, ends)
+    return residual, rates, bias, jacobian
+
+
+def elastic(tile: Tile, arrays: Arrays, room: Work) -> None:
+    """The elastic part of the force, into room.a."""
+    _run(_elastic, tile, arrays, room)
+
+
+def accelerate(tile: Tile, arrays: Arrays, room: Work, t: float, tolerance: float) -> None:
+    """The acceleration by Gauss's principle, into room.a."""
+    _run(_accelerate, tile, arrays, room, t, tolerance)
+
+
+def energies(tile: Tile, arrays: Arrays, room: Work) -> None:
+    """The energies [J], into room.energy."""
+    _run(_stored, tile, arrays, room)
+
+
+def remember(tile: Tile, arrays: Arrays, room: Work) -> None:
+    """Count the turns of angle forces."""
+    _run(_remember, tile, arrays, room)
+
+
+def signatures(tile: Tile, arrays: Arrays, room: Work) -> list[kernels.Kernel]:
+    """Return the kernels of all evaluations of a model, with the types of their arguments."""
+    return [(kernel, _kinds(tile, arrays, room)) for kernel in (_look, _elastic, _accelerate, _stored, _remember)]
+
+
+def _run(
+    kernel: Any,
+    tile: Tile,
+    arrays: Arrays,
+    room: Work,
+    t: float = 0.0,
+    tolerance: float = 0.0,
+    out: Array = _NOTHING,
+) -> None:
+    key = kernel.__name__, len(tile), len(arrays.space), *map(type, arrays.elements)
+    if key not in _ADDRESSES:
+        _ADDRESSES[key] = function_pointers.address(kernel, _kinds(tile, arrays, room))
+    _call(_ADDRESSES[key], tile, arrays.storage, room.storage, float(t), tolerance, out)
+
+
+def _kinds(tile: Tile, arrays: Arrays, room: Work) -> tuple[Any, ...]:
+    number = types.float64
+    structure = (types.CPointer(raw_type(typeof(part))) for part in (arrays, room))
+    return typeof(tile), *structure, number, number, types.CPointer(number)
+
+
+@njit(cache=True)
+def _call(address: int, tile: Tile, arrays: Array, room: Array, t: float, tolerance: float, out: Array) -> None:
+    function_pointers.call(address, (tile, pointer(arrays), pointer(room), t, tolerance, pointer(out)))
 
 
 @njit(cache=True, error_model="numpy")
-def look(
-    tile: Tile, arrays: Arrays, room: Work, t: float, gap: Array, rate: Array, bias: Array, jacobian: Array
-) -> None:
-    """Force (into room.a), energies (room.energy) and constraints of the state in `room`."""
-    m, w = raw(arrays), raw(room)
-    kernels.enter(m, w)
+def _look(tile, pm, pw, t, tolerance, out):  # type: ignore[no-untyped-def]
+    m, w, size = load(pm), load(pw), load(pm).constraints.size * len(tile)
     derive(tile, m.derived, w.z, m.unknowns, m.rows, False)
     derive(tile, m.derived, w.zdot, m.unknowns, m.rows, True)
     kernels.force(tile, m, w, t, w.z, w.zdot, w.a)
     kernels.energies(tile, m, w)
-    constraints.residual(tile, m.constraints, m.functions, t, w.z, pointer(gap))
-    constraints.rates(tile, m.constraints, m.functions, t, pointer(rate))
-    constraints.bias(tile, m.constraints, m.functions, t, w.zdot, pointer(bias))
-    constraints.jacobian(tile, m.constraints, w.z, 1.0, pointer(jacobian))
+    constraints.residual(tile, m.constraints, m.functions, t, w.z, out)
+    constraints.rates(tile, m.constraints, m.functions, t, shift(out, size))
+    constraints.bias(tile, m.constraints, m.functions, t, w.zdot, shift(out, 2 * size))
+    constraints.jacobian(tile, m.constraints, w.z, 1.0, shift(out, 3 * size))
 
 
 @njit(cache=True, error_model="numpy")
-def elastic(tile: Tile, arrays: Arrays, room: Work) -> None:
-    """The elastic part of the force, into room.a."""
-    m, w = raw(arrays), raw(room)
-    kernels.enter(m, w)
+def _elastic(tile, pm, pw, t, tolerance, out):  # type: ignore[no-untyped-def]
+    m, w = load(pm), load(pw)
     kernels.elastic_force(tile, m, w, w.z, w.a, False)
 
 
 @njit(cache=True, error_model="numpy")
-def accelerate(tile: Tile, arrays: Arrays, room: Work, t: float, tolerance: float) -> None:
-    """The acceleration by Gauss's principle, into room.a."""
-    m, w = raw(arrays), raw(room)
-    kernels.enter(m, w)
+def _accelerate(tile, pm, pw, t, tolerance, out):  # type: ignore[no-untyped-def]
+    m, w = load(pm), load(pw)
     kernels.acceleration(tile, m, w, t, w.z, w.zdot, tolerance, w.a)
 
 
 @njit(cache=True, error_model="numpy")
-def remember(tile: Tile, arrays: Arrays, room: Work) -> None:
-    """Count the turns of angle forces."""
-    m, w = raw(arrays), raw(room)
-    count(tile, m, w)
+def _stored(tile, pm, pw, t, tolerance, out):  # type: ignore[no-untyped-def]
+    kernels.energies(tile, load(pm), load(pw))
 
 
 @njit(cache=True, error_model="numpy")
-def along(
-    tile: Tile,
-    arrays: Arrays,
-    room: Work,
-    way: Array,
-    sample: Index,
-    v: Array,
-    times: Array,
-    tolerance: float,
-    a: Array,
-    turns: Array,
-) -> None:
-    """Accelerations and the turns of angle forces at the poses of a way whose `sample` is one, not -1."""
-    m, w = raw(arrays), raw(room)
-    kernels.enter(m, w)
-    for k in range(len(way)):
-        room.z[: m.unknowns] = way[k]
-        if k > 0:
-            count(tile, m, w)
-        n = sample[k]
-        if n >= 0:
-            room.zdot[: m.unknowns] = v[n]
-            turns[n] = room.memory
-            kernels.acceleration(tile, m, w, times[n], w.z, w.zdot, tolerance, w.a)
-            a[n] = room.a[: m.unknowns]
+def _remember(tile, pm, pw, t, tolerance, out):  # type: ignore[no-untyped-def]
+    dynamics.remember(tile, load(pm), load(pw))
