@@ -201,6 +201,8 @@ def constrain(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, t
         _constrain(tile, m, w, t, z, zdot, tolerance, a)
     if m.driven:
         constraints.add_power(tile, m.constraints, m.functions, t, w.gauss.multiplier, w.power)
+        for lane in range(len(tile)):
+            w.power[lane] -= w.gauss.power[lane]
 
 
 @njit(cache=True, error_model="numpy", inline="always")

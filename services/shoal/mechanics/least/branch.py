@@ -20,7 +20,7 @@ from numba import njit
 
 from shoal.mechanics import constraints, functions
 from shoal.mechanics.derived import derive
-from shoal.mechanics.least import projection
+from shoal.mechanics.least import crossing, projection
 from shoal.mechanics.least.many import STILL
 from shoal.mechanics.least.work import GaussWork, LaneWork
 from shoal.mechanics.model import Arrays
@@ -31,6 +31,8 @@ ROUNDS = 30
 """Iterations at most of the projection onto the cone, and of tangent and acceleration at rest."""
 ROUND_OFF = 1e-14
 """A distance from the cone that is none."""
+GONE = 1e-11
+"""What is left of a row that is redundant everywhere, as a part of its length."""
 ON_CONE = 1e-3
 """Largest distance from the cone of a tangent of a branch."""
 AWAY = 0.1
@@ -41,6 +43,46 @@ SETTLED = 1e-9
 """Relative change of the acceleration at which the fixed point at rest has converged."""
 VELOCITY, ACCELERATION = 1, 2
 """What the tangent is: the derivative of the coordinates of this order."""
+
+
+@njit(cache=True, error_model="numpy")
+def is_real(tile: Tile, m: Arrays, w: GaussWork, s: LaneWork, t: float, v: Array, lane: int, first: int) -> bool:
+    """Return whether branches of the motion of one lane cross at the singular position near it; see `crossing`.
+
+    first: rank of the constraints, beyond which s.rows holds what is left of the dependent ones. C is in w.residual.
+    At rest nothing is known of the tangent, and branches are taken to cross.
+    """
+    width, n, c = len(tile), m.unknowns, m.constraints
+    for number in range(first, c.size):
+        square = projection.dot(s.rows[number], s.rows[number])
+        if not square > GONE**2:
+            continue
+        projection.dependence(number, first, s.triangle, s.norms, s.order, s.shift)
+        constraints.jacobian(tile, c, v, 0.0, w.turning)
+        crossing.turn(tile, m, w, s.shift, lane, w.extra)
+        pace, largest = constraints.pace(tile, c, s.shift, v, lane), _largest(width, n, lane, w.extra)
+        sparse.forward(tile, m.pattern, m.mass_factor, m.mass_root, w.extra, 0)
+        if not (largest > STILL * pace and _is_new(width, n, lane, first, s, w.extra, projection.NEW * pace / largest)):
+            continue
+        for i in range(n):
+            w.branch[i * width + lane] = s.rows[number, i]
+        sparse.backward(tile, m.pattern, m.mass_factor, m.mass_root, w.branch, 0)
+        if not crossing.crosses(tile, m, w, t, v, lane, s.shift, square):
+            return False
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def power(tile: Tile, m: Arrays, w: GaussWork, s: LaneWork, v: Array, lane: int, first: int, rank: int) -> float:
+    """Return the power [W] of the rows from `first` on, whose changes are in s.wanted: a part of the work of drives."""
+    width = len(tile)
+    for i in range(m.unknowns):
+        total = 0.0
+        for j in range(first, rank):
+            total += s.wanted[j] * s.rows[j, i]
+        w.extra[i * width + lane] = total
+    sparse.backward(tile, m.pattern, m.mass_factor, m.mass_root, w.extra, 0)
+    return crossing.power(tile, m, w, v, w.extra, lane)  # type: ignore[no-any-return]
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -203,14 +245,11 @@ def _rows(
     for number in range(first, count):
         projection.dependence(number, first, s.triangle, s.norms, s.order, s.weights)
         bend, kick = 0.0, 0.0
-        for i in range(n * width):
-            w.extra[i] = 0.0
         for k in range(count):
             if c.drive[k] >= 0 and order == VELOCITY:
                 bend += s.weights[k] * functions.evaluate(m.functions, c.drive[k], t, 2)
                 kick += s.weights[k] * functions.evaluate(m.functions, c.drive[k], t, 3)
-            for e in range(c.entry[k], c.entry[k + 1]):
-                w.extra[c.column[e] * width + lane] += s.weights[k] * w.turning[e * width + lane]
+        crossing.turn(tile, m, w, s.weights, lane, w.extra)
         pace = constraints.pace(tile, c, s.weights, w.branch, lane)
         if not _largest(width, n, lane, w.extra) > STILL * pace:
             continue

@@ -9,6 +9,7 @@ from shoal.compile.pointers import pointer
 from shoal.compile.vector import add, clear, copy, subtract
 from shoal.mechanics import constraints, functions, saddle
 from shoal.mechanics.constraints import Constraints
+from shoal.mechanics.least import crossing
 from shoal.mechanics.least.projection import NOTHING, dot
 from shoal.mechanics.least.work import GaussWork
 from shoal.mechanics.model import Arrays
@@ -50,7 +51,7 @@ def solve(tile: Tile, m: Arrays, w: GaussWork, load: Array, gap: Array, out: Arr
 
 
 @njit(cache=True, error_model="numpy")
-def constrain(tile: Tile, m: Arrays, w: GaussWork, t: float, v: Array, a: Array) -> bool:
+def constrain(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array, a: Array) -> bool:
     """See `principle.constrain`; C_q and eta are in w. Whether it is done: not for few constraints near singular."""
     c = m.constraints
     entries = c.entry[c.size]
@@ -60,20 +61,20 @@ def constrain(tile: Tile, m: Arrays, w: GaussWork, t: float, v: Array, a: Array)
         return False
     solve(tile, m, w, a, w.gap, a, w.multiplier)
     if dropped > 0:
-        _add_third_derivatives(tile, m, w, t, v, a)
+        _add_dropped(tile, m, w, t, q, v, a)
     return True
 
 
 @njit(cache=True, error_model="numpy")
-def _combine(tile: Tile, c: Constraints, w: GaussWork, number: int, lane: int, weights: Array) -> None:
-    """Shares of the rows in the combination of row `number` that vanishes, by its multipliers in w."""
+def _combine(tile: Tile, c: Constraints, w: GaussWork, number: int, lane: int, shares: Array, weights: Array) -> None:
+    """Shares of the rows in the combination of row `number` that vanishes, by those of the others in it."""
     width, largest = len(tile), 0.0
     for turn in range(2):
         for j in range(c.size):
             square = 0.0
             for e in range(c.entry[j], c.entry[j + 1]):
                 square += w.jacobian[e * width + lane] ** 2
-            share = (1.0 if j == number else 0.0) - w.multiplier[j * width + lane]
+            share = (1.0 if j == number else 0.0) - shares[j * width + lane]
             if turn == 0:
                 largest = max(largest, abs(share) * np.sqrt(square))
             alien = j != number and abs(share) * np.sqrt(square) < NOTHING * largest
@@ -81,18 +82,20 @@ def _combine(tile: Tile, c: Constraints, w: GaussWork, number: int, lane: int, w
 
 
 @njit(cache=True, error_model="numpy")
-def _add_third_derivatives(tile: Tile, m: Arrays, w: GaussWork, t: float, v: Array, a: Array) -> None:
-    """Correct `a` by the rows u' d3C/dt3 = 0 of the rows that the factorisation left out, one after the other."""
+def _add_dropped(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array, a: Array) -> None:
+    """Correct `a` by a row for each that the factorisation left out, one after the other.
+
+    Where branches of the motion cross it is u' d3C/dt3 = 0, else u' d2C/dt2 = 0, with what is left of u' C_q.
+    """
     width = len(tile)
     c = m.constraints
     n, count = m.unknowns, c.size
-    constraints.jacobian(tile, c, v, 0.0, w.turning)
+    constraints.residual(tile, c, m.functions, t, q, w.residual)
     moves = np.zeros((count, n))
     rows = np.zeros((count, n))
-    zeros = np.zeros(count * width)
+    none, shares = np.zeros(count * width), np.zeros(count * width)
     weights = np.zeros(count)
-    load = np.zeros(n * width)
-    found = np.zeros(n * width)
+    load, found, change = np.zeros(n * width), np.zeros(n * width), np.zeros(n * width)
     for lane in range(width):
         rank = 0
         for k in range(count):
@@ -103,39 +106,56 @@ def _add_third_derivatives(tile: Tile, m: Arrays, w: GaussWork, t: float, v: Arr
                 load[i] = 0.0
             for e in range(c.entry[k], c.entry[k + 1]):
                 load[c.column[e] * width + lane] = w.jacobian[e * width + lane]
-            solve(tile, m, w, pointer(load), pointer(zeros), pointer(found), w.multiplier)
-            target = 0.0
-            for i in range(n):
-                rows[rank, i] = 0.0
-            _combine(tile, c, w, k, lane, weights)
-            for j in range(count):
-                target -= weights[j] * functions.evaluate(m.functions, c.drive[j], t, 3)
-                for e in range(c.entry[j], c.entry[j + 1]):
-                    rows[rank, c.column[e]] += 3.0 * weights[j] * w.turning[e * width + lane]
-            largest = 0.0
-            for i in range(n * width):
-                load[i] = 0.0
-            for i in range(n):
-                largest = max(largest, abs(rows[rank, i]))
-                load[i * width + lane] = rows[rank, i]
-            pace = constraints.pace(tile, c, weights, v, lane)
+            solve(tile, m, w, pointer(load), pointer(none), pointer(found), pointer(shares))
+            _combine(tile, c, w, k, lane, shares, weights)
+            constraints.jacobian(tile, c, v, 0.0, w.turning)
+            crossing.turn(tile, m, w, weights, lane, pointer(load))
+            largest, pace = 0.0, constraints.pace(tile, c, weights, v, lane)
+            for i in range(lane, n * width, width):
+                largest = max(largest, abs(load[i]))
             if not largest > STILL * pace:
                 continue
-            solve(tile, m, w, pointer(load), pointer(zeros), pointer(found), w.multiplier)
-            whole = 0.0
+            solve(tile, m, w, pointer(load), pointer(none), pointer(found), pointer(shares))
+            gap, whole = 0.0, 0.0
             for i in range(n):
-                moves[rank, i] = found[i * width + lane]
+                rows[rank, i], moves[rank, i] = load[i * width + lane], found[i * width + lane]
                 whole += moves[rank, i] * rows[rank, i]
-            for r in range(rank):
-                part = dot(rows[r], moves[rank]) / dot(rows[r], moves[r])
-                for i in range(n):
-                    moves[rank, i] -= part * moves[r, i]
-            along = dot(rows[rank], moves[rank])
-            if not along > 1e-10 * whole * (3.0 * pace / largest) ** 2:
+            if not _is_independent(rank, rows, moves, 1e-10 * whole * (pace / largest) ** 2):
                 continue
-            gap = target
+            for i in range(n):
+                load[i * width + lane] = 0.0
+            for j in range(count):
+                for e in range(c.entry[j], c.entry[j + 1]):
+                    load[c.column[e] * width + lane] += weights[j] * w.jacobian[e * width + lane]
+            solve(tile, m, w, pointer(load), pointer(none), w.branch, pointer(shares))
+            square = 0.0
+            for i in range(lane, n * width, width):
+                square += load[i] * w.branch[i]
+            if square > 0.0 and not crossing.crosses(tile, m, w, t, v, lane, weights, square):
+                for i in range(n):
+                    rows[rank, i], moves[rank, i] = load[i * width + lane], w.branch[i * width + lane]
+                for j in range(count):
+                    gap -= weights[j] * w.gap[j * width + lane]
+                if not _is_independent(rank, rows, moves, 0.0):
+                    continue
+            else:
+                for j in range(count):
+                    gap -= weights[j] * functions.evaluate(m.functions, c.drive[j], t, 3) / 3.0
             for i in range(n):
                 gap -= rows[rank, i] * a[i * width + lane]
+            gap /= dot(rows[rank], moves[rank])
             for i in range(n):
-                a[i * width + lane] += gap / along * moves[rank, i]
+                a[i * width + lane] += gap * moves[rank, i]
+                change[i * width + lane] += gap * moves[rank, i]
             rank += 1
+        if m.driven:
+            w.power[lane] = crossing.power(tile, m, w, v, change, lane)
+
+
+@njit(cache=True, error_model="numpy")
+def _is_independent(rank: int, rows: Array, moves: Array, least: float) -> bool:
+    """Take the rows before number `rank` out of its move; return whether more than the least is left of it along it."""
+    for r in range(rank):
+        part = dot(rows[r], moves[rank]) / dot(rows[r], moves[r])
+        moves[rank] -= part * moves[r]
+    return dot(rows[rank], moves[rank]) > least  # type: ignore[no-any-return]

@@ -14,6 +14,7 @@ from shoal.errors import InputError
 from shoal.mechanics import constraints
 from shoal.mechanics.derived import derive
 from shoal.mechanics.least import alternatives, branch, lent, many, projection, together
+from shoal.mechanics.least.branch import GONE
 from shoal.mechanics.least.work import HERE, GaussWork, lane_work, load_lane, rows
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics import sparse
@@ -22,8 +23,6 @@ from shoal.mechanics.numerics.tile import Array, Tile
 LEAVING = 3.0
 """A singular position is left this much farther away than it is entered: the distance depends on the order of pivots,
 and steps would end at every change between the two ways to the acceleration."""
-ROUND_OFF = 1e-11
-"""What is left of a row that is redundant everywhere, as a part of its length."""
 PROJECTION, BAUMGARTE = 0, 4
 METHODS = {
     "projection": PROJECTION,
@@ -61,7 +60,9 @@ def constrain(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array,
     best tolerance is about the cube root of eps.
     """
     state(tile, m, w, t, q, v)
-    if m.saddle.size > 0 and m.method == PROJECTION and many.constrain(tile, m, w, t, v, a):
+    for lane in range(len(tile)):
+        w.power[lane] = 0.0
+    if m.saddle.size > 0 and m.method == PROJECTION and many.constrain(tile, m, w, t, q, v, a):
         return
     width = len(tile)
     s = lane_work(m, w)
@@ -71,7 +72,7 @@ def constrain(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array,
         _stabilise(tile, m, w, t, q, v)
     count, n, alone = m.constraints.size, m.unknowns, 0
     orthogonal = m.method == PROJECTION or m.method == BAUMGARTE
-    turned = False
+    turned, measured = False, False
     for lane in range(width):
         if width % len(EIGHT) == 0 and lane % len(EIGHT) == 0 and orthogonal:
             rank = together.orthonormalise(w.group, count, n, width, lane, w.response, tolerance)
@@ -93,7 +94,13 @@ def constrain(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array,
             near = tolerance * (LEAVING if w.near[lane] == HERE else 1.0)
             rank = projection.orthonormalise(s.rows, s.triangle, s.norms, s.order, near)
             left = projection.left(rank, s.rows)
-            w.near[lane] = HERE if left > ROUND_OFF else 0.0
+            if left > GONE:
+                turned, measured = False, measured or _measure(tile, m, w, t, q)
+                if not branch.is_real(tile, m, w, s, t, v, lane, rank):
+                    load_lane(width, lane, m, w, s, a)
+                    rank = projection.orthonormalise(s.rows, s.triangle, s.norms, s.order, GONE)
+                    left = projection.left(rank, s.rows)
+            w.near[lane] = HERE if left > GONE else 0.0
             first = rank
             projection.components(rank, s.triangle, s.norms, s.order, s.weights, s.wanted)
             locked = False
@@ -103,12 +110,14 @@ def constrain(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array,
                 w.near[lane] = HERE if locked or rank > first else w.near[lane]
             distance = s.triangle[first - 1, first - 1] if first > 0 else 1.0
             if w.near[lane] == HERE:
-                distance = max(left, ROUND_OFF)
+                distance = max(left, GONE)
             w.closeness[lane] = max(w.closeness[lane], 1.0 / distance**2)
             projection.move(rank, s.rows, s.wanted, s.y)
             lent.take_back_from_lane(tile, m, w, s, lane, rank, orthogonal)
             if locked:
                 projection.confine(rank, s.rows, s.y, s.row)
+            if m.driven and rank > first:
+                w.power[lane] = branch.power(tile, m, w, s, v, lane, first, rank)
             projection.multipliers(first, s.triangle, s.norms, s.order, s.wanted, s.weights)
         else:
             s.wanted[:] = 0.0
@@ -128,6 +137,13 @@ def constrain(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array,
 def _turn(tile: Tile, m: Arrays, w: GaussWork, v: Array) -> bool:
     """dC_q/dt into w.turning."""
     constraints.jacobian(tile, m.constraints, v, 0.0, w.turning)
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def _measure(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array) -> bool:
+    """C into w.residual."""
+    constraints.residual(tile, m.constraints, m.functions, t, q, w.residual)
     return True
 
 

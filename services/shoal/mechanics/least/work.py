@@ -42,17 +42,19 @@ class LaneWork(NamedTuple):
 class GaussWork(NamedTuple):
     """Work space of one tile.
 
-    jacobian, turning: C_q and dC_q/dt (entries, lanes). response: C_q' or H^-1 C_q' (constraints * unknowns, lanes).
-    gram: (constraints^2, lanes). multiplier, gap: (constraints, lanes). extra, moved, lent: (unknowns, lanes), for
-    the two last see `lent`. branch: tangent of the motion at a singular position, (rows, lanes). near: whether a lane
-    is at a singular position, HERE, else 0, (lanes,). closeness: inverse square of the smallest distance from singular
-    positions so far, the remainder of a row relative to its length, (lanes,); 0: not known. ended:
-    by lane the instant [s] from which its motion is no number, then the constraint that could not be closed, or
-    UNENDED.
+    jacobian, turning: C_q and dC_q/dt (entries, lanes). residual: C (constraints, lanes), near singular positions only.
+    response: C_q' or H^-1 C_q' (constraints * unknowns, lanes). gram: (constraints^2, lanes).
+    multiplier, gap: (constraints, lanes). extra, moved, lent: (unknowns, lanes), for the two last see `lent`.
+    branch: tangent of the motion at a singular position, (rows, lanes). near: whether a lane is at a singular position,
+    HERE, else 0, (lanes,). closeness: inverse square of the smallest distance from singular positions so far, the
+    remainder of a row relative to its length, (lanes,); 0: not known. power: that of the rows by which third
+    derivatives hold a motion on its branch [W], (lanes,). ended: by lane the instant [s] from which its motion is no
+    number, then the constraint that could not be closed, or UNENDED.
     """
 
     jacobian: Array
     turning: Array
+    residual: Array
     response: Array
     gram: Array
     multiplier: Array
@@ -63,6 +65,7 @@ class GaussWork(NamedTuple):
     branch: Array
     near: Array
     closeness: Array
+    power: Array
     ended: Array
     lane: LaneWork
     group: GroupWork
@@ -72,16 +75,18 @@ class GaussWork(NamedTuple):
 def work_space(width: int, m: Arrays) -> GaussWork:
     """Room for the constraints of a model."""
     count, n, entries = m.constraints.size, m.unknowns, len(m.constraints.column)
-    sizes = entries, entries, count * n, count * count, count, count
-    jacobian, turning, response, gram, multiplier, gap = (np.zeros(size * width) for size in sizes)
+    sizes = entries, entries, count, count * n, count * count, count, count
+    jacobian, turning, residual, response, gram, multiplier, gap = (np.zeros(size * width) for size in sizes)
     extra, moved, lent, branch = (np.zeros(rows * width) for rows in (n, n, n, m.rows))
+    near, closeness, power = (np.zeros(width) for _ in range(3))
     order = np.zeros(count, dtype=np.int64)
     wanted, weights, shift = (np.zeros(count) for _ in range(3))
     first = np.zeros((count, n)), np.zeros((count, count)), np.zeros(count), order, wanted, weights, shift
     lane = LaneWork(*first, np.zeros(n), np.zeros(n))
     group, room = together.room(width, count, n), saddle.room(m.saddle.size, m.saddle.slots, width)
-    vectors = multiplier, gap, extra, moved, lent, branch, np.zeros(width), np.zeros(width), np.full(2 * width, UNENDED)
-    return GaussWork(jacobian, turning, response, gram, *vectors, lane, group, room)
+    matrices = jacobian, turning, residual, response, gram
+    vectors = multiplier, gap, extra, moved, lent, branch, near, closeness, power, np.full(2 * width, UNENDED)
+    return GaussWork(*matrices, *vectors, lane, group, room)
 
 
 @njit(cache=True, error_model="numpy")
