@@ -218,7 +218,7 @@ def test_lanes_equal_singles(vectors: int) -> None:
     elastic, damped = _family(rule, lanes=width), _family(rule, lanes=width, eta=ETA)
     for wide, single in ((elastic, _family(rule)), (damped, _family(rule, eta=ETA))):
         forces, power, energy = np.zeros(side * width), np.zeros(width), np.zeros(width)
-        work = np.zeros(64 * width)
+        work = np.zeros(ELEMENT_ROOM)
         doors.force(WIDE, wide, states.ravel(), rates.ravel(), forces, work, power)
         doors.energy(WIDE, wide, states.ravel(), work, energy)
         blocks = np.zeros(side * side * width)

@@ -118,9 +118,9 @@ def test_lanes_equal_singles(quadrature: str) -> None:
     forces, tangents = np.zeros((8, width)), np.zeros((64, width))
     elements = _element(quadrature, width)
     doors.force(
-        WIDE, elements, states.ravel(), states.ravel(), forces.reshape(-1), np.zeros(64 * width), np.zeros(width)
+        WIDE, elements, states.ravel(), states.ravel(), forces.reshape(-1), np.zeros(ELEMENT_ROOM), np.zeros(width)
     )
-    doors.tangent(WIDE, elements, states.ravel(), np.zeros(64 * width), tangents.reshape(-1))
+    doors.tangent(WIDE, elements, states.ravel(), np.zeros(ELEMENT_ROOM), tangents.reshape(-1))
     for lane in range(width):
         single = _force(quadrature, np.ascontiguousarray(states[:, lane]))
         np.testing.assert_allclose(forces[:, lane], single, atol=1e-13 * np.abs(single).max())

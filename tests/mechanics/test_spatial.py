@@ -9,36 +9,36 @@ import element_doors as doors
 import numpy as np
 import pytest
 from shoal.mechanics.dynamics import ELEMENT_ROOM
-from shoal.mechanics.elements import beam, cubic, families, quintic, spatial_cubic, spatial_quintic
+from shoal.mechanics.elements import beam, cubic, families, quintic
 from shoal.mechanics.numerics.tile import SINGLE, WIDE, packed
 
 EA, EI, LENGTH, ETA = 1.6e5, 5.3, 0.5, 2e-3
 Family = Any
 CASES: dict[str, tuple[Family, int, Any, int]] = {
-    "cubic, full": (spatial_cubic.SpatialCubics, spatial_cubic.FULL, cubic.FULL_RULE, beam.CUBIC),
-    "cubic, reduced": (spatial_cubic.SpatialCubics, spatial_cubic.REDUCED, cubic.REDUCED_RULE, beam.CUBIC),
-    "cubic, damped": (spatial_cubic.SpatialCubics, spatial_cubic.DAMPED, cubic.FULL_RULE, beam.CUBIC),
+    "cubic, full": (cubic.SpatialCubics, cubic.FULL, cubic.FULL_RULE, beam.CUBIC),
+    "cubic, reduced": (cubic.SpatialCubics, cubic.REDUCED, cubic.REDUCED_RULE, beam.CUBIC),
+    "cubic, damped": (cubic.SpatialCubics, cubic.DAMPED, cubic.FULL_RULE, beam.CUBIC),
     "quintic, four": (
-        spatial_quintic.SpatialQuintics,
-        spatial_quintic.FOUR,
+        quintic.SpatialQuintics,
+        quintic.FOUR,
         beam.quadrature(beam.QUINTIC, 4, 4),
         beam.QUINTIC,
     ),
     "quintic, four, damped": (
-        spatial_quintic.SpatialQuintics,
-        spatial_quintic.FOUR_DAMPED,
+        quintic.SpatialQuintics,
+        quintic.FOUR_DAMPED,
         beam.quadrature(beam.QUINTIC, 4, 4),
         beam.QUINTIC,
     ),
     "quintic, five": (
-        spatial_quintic.SpatialQuintics,
-        spatial_quintic.FIVE,
+        quintic.SpatialQuintics,
+        quintic.FIVE,
         beam.quadrature(beam.QUINTIC, 5, 5),
         beam.QUINTIC,
     ),
     "quintic, five, damped": (
-        spatial_quintic.SpatialQuintics,
-        spatial_quintic.FIVE_DAMPED,
+        quintic.SpatialQuintics,
+        quintic.FIVE_DAMPED,
         beam.quadrature(beam.QUINTIC, 5, 5),
         beam.QUINTIC,
     ),
@@ -207,7 +207,7 @@ def test_lanes_and_neighbours_equal_singles(case: str) -> None:
     )
     tangents = np.array([_matrix(case, z.reshape(-1, 3)).ravel() for z in states])
     wide, matrices = np.zeros((side, width)), np.zeros((side**2, width))
-    lanes, room = _elements(case, lanes=width), np.zeros(64 * width)
+    lanes, room = _elements(case, lanes=width), np.zeros(ELEMENT_ROOM)
     at = np.ascontiguousarray(states.T).ravel(), np.ascontiguousarray(rates.T).ravel()
     doors.force(WIDE, lanes, *at, wide.reshape(-1), room, np.zeros(width))
     doors.matrix(WIDE, lanes, False, at[0], room, matrices.reshape(-1))

@@ -20,8 +20,8 @@ from shoal.mechanics.numerics import alike, sparse
 from shoal.mechanics.numerics.tile import Array, Tile
 
 ELEMENT_ROWS = 64
-ELEMENT_ROOM = 1024
-"""Numbers of room at least: eight elements of a single lane are computed at once."""
+ELEMENT_ROOM = 2336
+"""Numbers of room at least: `beam_table` keeps 292 numbers for each of eight elements that are computed at once."""
 ALL, ELASTIC, SIMPLE, ACCELERATION = 0, 1, 2, 3
 """Parts of the force: everything, the elastic part, the elastic part but for elements that know their mean force; or
 the acceleration that follows from everything."""
@@ -31,7 +31,8 @@ class Work(NamedTuple):
     """The state of one tile and the room to compute its change.
 
     z, zdot, a: coordinates, rates and accelerations, (rows, lanes). before: z, zdot and a at the
-    beginning of the step. stage: room of four states for integrators. element: room of 64 rows or more. memory: the
+    beginning of the step. stage: room of four states for integrators. element: room of 64 rows and
+    of `ELEMENT_ROOM` numbers at least. memory: the
     continuous angle of every force element, (forces, lanes). power: dissipated minus supplied power
     [W], (lanes,). energy: kinetic, elastic, potential, elastic of the bodies alone [J], (4, lanes). until: the last
     instant [s] before functions of time may jump, (1,); later times are replaced by it. rubbing: of

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from shoal.mechanics.elements import ancf_full, cubic, director, quintic, simo_reissner, spatial_cubic, spatial_quintic
+from shoal.mechanics.elements import ancf_full, cubic, director, quintic, simo_reissner
 from shoal.mechanics.elements.element import Element
 
 ELEMENTS: dict[str, Element] = {
@@ -13,8 +13,8 @@ ELEMENTS: dict[str, Element] = {
 }
 
 SPATIAL: dict[str, Element] = {
-    "ancf-cable": spatial_cubic.ELEMENT,
-    "ancf-quintic": spatial_quintic.ELEMENT,
+    "ancf-cable": cubic.SPATIAL_ELEMENT,
+    "ancf-quintic": quintic.SPATIAL_ELEMENT,
     "director-rod": director.ELEMENT,
 }
 """The elements of scenes in space."""

@@ -8,17 +8,18 @@ from __future__ import annotations
 
 from typing import Any
 
-from numba import njit
+from numba import njit, types
 from numba.extending import overload
 
 from shoal.compile import simd
 from shoal.compile.pointers import shift
 from shoal.compile.simd import EIGHT
-from shoal.mechanics.elements.families import PLAN, Family
+from shoal.mechanics.elements.families import PLAN, PLANE, Family
 from shoal.mechanics.numerics.tile import Array, Tile
 
 REST, VARIANT, TOGETHER = 2, 3, 4
 """Columns of the plan: see `families.PLAN`."""
+_INLINE = {"error_model": "numpy", "forceinline": True}
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -35,6 +36,28 @@ def together(tile: Tile, family: Family, number: int) -> int:
 
 def coordinate(tile: Tile, family: Family, number: int, lane: int, side: int, k: int, z: Array) -> Any:
     """Row k of `side` of the elements from this number on, of the state z."""
+    raise NotImplementedError
+
+
+def nodal(
+    k: int, tile: Tile, space: tuple[int, ...], family: Family, number: int, lane: int, count: int, z: Array
+) -> Any:
+    """Vector k of `count` of the elements from this number on, a tuple as long as `space`."""
+    raise NotImplementedError
+
+
+def kept(space: tuple[int, ...], w: Array, at: int, step: int) -> Any:
+    """Return a tuple of the vectors at, at + step, ... of the work space, as long as `space`."""
+    raise NotImplementedError
+
+
+def kept_matrix(space: tuple[int, ...], w: Array, at: int, down: int, right: int) -> Any:
+    """Return rows of vectors of the work space, `down` from row to row and `right` from column to column."""
+    raise NotImplementedError
+
+
+def zeros_like(a: Any) -> Any:
+    """Return zero vectors, as many as a tuple has, or a matrix of them."""
     raise NotImplementedError
 
 
@@ -69,6 +92,59 @@ def _coordinate(tile, family, number, lane, side, k, z):  # type: ignore[no-unty
         return lambda tile, family, number, lane, side, k, z: simd.pick(EIGHT, z, family.rows, side * number + k, side)
     return lambda tile, family, number, lane, side, k, z: simd.load(
         EIGHT, z, family.rows[side * number + k] * len(tile) + lane
+    )
+
+
+@overload(kept, jit_options=_INLINE)
+def _kept(space, w, at, step):  # type: ignore[no-untyped-def]
+    width = len(EIGHT)
+    if space.count == len(PLANE):
+        return lambda space, w, at, step: (
+            simd.load(EIGHT, w, width * at),
+            simd.load(EIGHT, w, width * (at + step)),
+        )
+    return lambda space, w, at, step: (
+        simd.load(EIGHT, w, width * at),
+        simd.load(EIGHT, w, width * (at + step)),
+        simd.load(EIGHT, w, width * (at + 2 * step)),
+    )
+
+
+@overload(kept_matrix, jit_options=_INLINE)
+def _kept_matrix(space, w, at, down, right):  # type: ignore[no-untyped-def]
+    if space.count == len(PLANE):
+        return lambda space, w, at, down, right: (kept(space, w, at, right), kept(space, w, at + down, right))
+    return lambda space, w, at, down, right: (
+        kept(space, w, at, right),
+        kept(space, w, at + down, right),
+        kept(space, w, at + 2 * down, right),
+    )
+
+
+@overload(zeros_like, jit_options=_INLINE)
+def _zeros_like(a):  # type: ignore[no-untyped-def]
+    if isinstance(a[0], types.BaseTuple):
+        if len(a) == 2:
+            return lambda a: (zeros_like(a[0]), zeros_like(a[1]))
+        return lambda a: (zeros_like(a[0]), zeros_like(a[1]), zeros_like(a[2]))
+    if len(a) == 1:
+        return lambda a: (simd.spread(EIGHT, 0.0),)
+    if len(a) == 2:
+        return lambda a: (simd.spread(EIGHT, 0.0), simd.spread(EIGHT, 0.0))
+    return lambda a: (simd.spread(EIGHT, 0.0), simd.spread(EIGHT, 0.0), simd.spread(EIGHT, 0.0))
+
+
+@overload(nodal, jit_options=_INLINE)
+def _nodal(k, tile, space, family, number, lane, count, z):  # type: ignore[no-untyped-def]
+    if space.count == len(PLANE):
+        return lambda k, tile, space, family, number, lane, count, z: (
+            coordinate(tile, family, number, lane, 2 * count, 2 * k, z),
+            coordinate(tile, family, number, lane, 2 * count, 2 * k + 1, z),
+        )
+    return lambda k, tile, space, family, number, lane, count, z: (
+        coordinate(tile, family, number, lane, 3 * count, 3 * k, z),
+        coordinate(tile, family, number, lane, 3 * count, 3 * k + 1, z),
+        coordinate(tile, family, number, lane, 3 * count, 3 * k + 2, z),
     )
 
 

@@ -18,6 +18,9 @@ PLAN = 5
 """Numbers of an element in the plan: its first row of the table, how many rows, its first row of the reference, the
 variant of the kernel (which only the family itself knows), and how many from here on are of that variant, at most 8."""
 
+PLANE, SPACE = (0,) * 2, (0,) * 3
+"""Tuples as long as vectors are, which makes the dimension a constant at compile time."""
+
 
 class Family(NamedTuple):
     """Elements of one family, any number of them, also none; each family is a subclass.
@@ -42,11 +45,15 @@ class Family(NamedTuple):
 
 
 class Kernel(NamedTuple):
-    """Sizes for one element: rows, coefficients, and the first of these that is a stiffness."""
+    """Sizes for one element: rows, coefficients, and the first of these that is a stiffness.
+
+    space: a tuple as long as its vectors are, of kernels that are written for both the plane and space.
+    """
 
     side: int
     coefficients: int
     first_stiffness: int
+    space: tuple[int, ...] = PLANE
 
 
 class Entry(NamedTuple):
@@ -111,8 +118,8 @@ def add_force(
 ) -> None:
     """Add the elastic force -dU/dz and the damping force [N, N m, ...] to f (rows, lanes). Pointers.
 
-    power: row 0 += power dissipated by damping [W]; w: work space of 64 rows. zdot and power are not looked at unless
-    the family is damped; moving: whether damping counts, or the elastic part alone.
+    power: row 0 += power dissipated by damping [W]; w: room, see `dynamics.Work`. zdot and power are not looked at
+    unless the family is damped; moving: whether damping counts, or the elastic part alone.
     """
     raise NotImplementedError(type(family).__name__)
 
@@ -128,7 +135,7 @@ def is_exact(family: Family) -> bool:
 
 
 def add_energy(tile: Tile, family: Family, z: Array, w: Array, energy: Array, row: int) -> None:
-    """Add the strain energy [J] to a row of energy; w: work space of 64 rows. Pointers."""
+    """Add the strain energy [J] to a row of energy; w: room as above. Pointers."""
     raise NotImplementedError(type(family).__name__)
 
 
@@ -142,6 +149,11 @@ def damping(tile: Tile, family: Family, z: Array, w: Array, out: Array, first: i
     raise NotImplementedError(type(family).__name__)
 
 
+def space_of(family: Family) -> tuple[int, ...]:
+    """Return a tuple as long as vectors are."""
+    raise NotImplementedError(type(family).__name__)
+
+
 def implement(
     kind: type, kernel: Kernel, *, force: Any, potential: Any, stiffness: Any, viscosity: Any = None, mean: Any = None
 ) -> None:
@@ -150,6 +162,7 @@ def implement(
     viscosity: of a family that may be damped. mean: of one that is exact.
     """
     KERNELS[kind] = kernel
+    choose(space_of, kind, (lambda family: PLANE) if kernel.space == PLANE else (lambda family: SPACE))
     choose(add_force, kind, force, forceinline=True)
     choose(add_energy, kind, potential)
     choose(tangent, kind, stiffness)

@@ -1,4 +1,4 @@
-"""The quintic beam element: nodes with position, slope and second derivative; theory in `beam`.
+"""The quintic beam element in R^d: nodes with position, slope and second derivative; theory in `beam`.
 
 A quarter of the elements of the cubic one serve the same accuracy. r' is a polynomial of fourth degree in xi, from -1
 to 1; points come in pairs +-xi that share its even and odd parts, and forces are sums over the points of what the
@@ -10,33 +10,27 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from shoal.compile.pointers import shift
-from shoal.compile.simd import EIGHT, inverse_root, reciprocal, root, spread
-from shoal.mechanics import plane
-from shoal.mechanics.elements import beam, beam_tangent
-from shoal.mechanics.elements.batch import (
-    VARIANT,
-    add_rows,
-    add_sum,
-    coefficient,
-    coordinate,
-    of_one_variant,
-    rest,
-    together,
-)
-from shoal.mechanics.elements.families import PLAN, Entry, Family, Kernel, implement
-from shoal.mechanics.elements.strain import bend, reference, stretch
+from shoal.compile.simd import EIGHT, inverse_root, reciprocal, spread
+from shoal.mechanics.elements import beam, beam_table
+from shoal.mechanics.elements.batch import VARIANT, add_rows, add_sum, coefficient, nodal, of_one_variant, zeros_like
+from shoal.mechanics.elements.families import PLAN, PLANE, SPACE, Entry, Family, Kernel, implement, space_of
+from shoal.mechanics.elements.strain import STRAIGHT, bend, reference, stretch
 from shoal.mechanics.numerics.tile import Array, Number, Tile
+from shoal.mechanics.numerics.tuples import dot, facing, minus, plus, times, wedge
 from shoal.scene import Rod
 from shoal.scene.sections import Section
 
-ROWS = 2 * beam.QUINTIC
+VECTORS = beam.QUINTIC
 FOUR, FOUR_CURVED, FOUR_DAMPED, FIVE, FIVE_CURVED, FIVE_DAMPED = range(6)
 """Variants: the points of the rule; straight and elastic, curved, curved or not and damped."""
 
 
 class Quintics(Family):
-    """Quintic beam elements. rows: x and y of r1, r1', r1'', r2, r2', r2''. Numbers: as in `beam`."""
+    """Quintic beam elements in the plane. rows: x and y of r1, r1', r1'', r2, r2', r2''. Numbers: as in `beam`."""
+
+
+class SpatialQuintics(Family):
+    """The same in space. rows: x, y and z of r1, r1', r1'', r2, r2', r2''."""
 
 
 def recommended(elements: int) -> Array:
@@ -60,80 +54,87 @@ def _slope() -> Array:
 _EVEN, _ODD = _slope()[[0, 2, 4], :3], _slope()[[1, 3], 3:]
 _GAUSS = np.polynomial.legendre.leggauss
 _FOUR_PAIRS, _FIVE_PAIRS = beam.pairs(*_GAUSS(4)), beam.pairs(*_GAUSS(5))
-_FOUR_POINTS, _FIVE_POINTS = (np.column_stack([x, weights / 2]) for x, weights in (_GAUSS(4), _GAUSS(5)))
 
 
 @njit(error_model="numpy", forceinline=True)
-def component(tile, family, number, lane, side, inverse, length, k, z):  # type: ignore[no-untyped-def]
-    """c0 to c4 in one direction, 0 or 1 of an element with 12 rows, 0 to 2 of one with 18."""
-    d = side // beam.QUINTIC
-    r1 = coordinate(tile, family, number, lane, side, k, z)
-    p1 = coordinate(tile, family, number, lane, side, d + k, z)
-    k1 = coordinate(tile, family, number, lane, side, 2 * d + k, z)
-    r2 = coordinate(tile, family, number, lane, side, 3 * d + k, z)
-    p2 = coordinate(tile, family, number, lane, side, 4 * d + k, z)
-    k2 = coordinate(tile, family, number, lane, side, 5 * d + k, z)
-    chord, k1, k2 = (r2 - r1) * inverse, k1 * length, k2 * length
-    s, a, u, b = p1 + p2, k1 - k2, p2 - p1, k1 + k2
+def _combined(a, x, b, y):  # type: ignore[no-untyped-def]
+    """a x + b y."""
+    return plus(times(a, x), b, y)
+
+
+@njit(error_model="numpy", forceinline=True)
+def _curve(tile, space, family, number, lane, inverse, length, z):  # type: ignore[no-untyped-def]
+    """c0 to c4."""
+    at = tile, space, family, number, lane, VECTORS, z
+    r1, p1, k1, r2, p2, k2 = nodal(0, *at), nodal(1, *at), nodal(2, *at), nodal(3, *at), nodal(4, *at), nodal(5, *at)
+    chord, k1, k2 = times(inverse, minus(r2, r1)), times(length, k1), times(length, k2)
+    s, a, u, b = plus(p1, 1.0, p2), minus(k1, k2), minus(p2, p1), plus(k1, 1.0, k2)
     return (
-        _EVEN[0, 0] * chord + _EVEN[0, 1] * s + _EVEN[0, 2] * a,
-        _ODD[0, 0] * u + _ODD[0, 1] * b,
-        _EVEN[1, 0] * chord + _EVEN[1, 1] * s + _EVEN[1, 2] * a,
-        _ODD[1, 0] * u + _ODD[1, 1] * b,
-        _EVEN[2, 0] * chord + _EVEN[2, 1] * s + _EVEN[2, 2] * a,
+        plus(_combined(_EVEN[0, 0], chord, _EVEN[0, 1], s), _EVEN[0, 2], a),
+        _combined(_ODD[0, 0], u, _ODD[0, 1], b),
+        plus(_combined(_EVEN[1, 0], chord, _EVEN[1, 1], s), _EVEN[1, 2], a),
+        _combined(_ODD[1, 0], u, _ODD[1, 1], b),
+        plus(_combined(_EVEN[2, 0], chord, _EVEN[2, 1], s), _EVEN[2, 2], a),
     )
 
 
 @njit(error_model="numpy", forceinline=True)
-def at_both(x, c):  # type: ignore[no-untyped-def]
-    """r' and L r'' at +xi and at -xi, in one direction."""
+def _at_both(x, c):  # type: ignore[no-untyped-def]
+    """r' and L r'' at +xi and at -xi."""
     c0, c1, c2, c3, c4 = c
     x2 = x * x
-    even, odd = c0 + x2 * (c2 + x2 * c4), x * (c1 + x2 * c3)
-    up, down = 2.0 * c1 + (6.0 * x2) * c3, x * (4.0 * c2 + (8.0 * x2) * c4)
-    return even + odd, even - odd, up + down, up - down
+    even, odd = plus(c0, x2, plus(c2, x2, c4)), times(x, plus(c1, x2, c3))
+    up, down = _combined(2.0, c1, 6.0 * x2, c3), times(x, _combined(4.0, c2, 8.0 * x2, c4))
+    return plus(even, 1.0, odd), minus(even, odd), plus(up, 1.0, down), minus(up, down)
 
 
 @njit(error_model="numpy", forceinline=True)
-def _point(damped, px, py, cx, cy, ux, uy, vx, vy, inverse, angle, axial, bending, eta):  # type: ignore[no-untyped-def]
+def _point(damped, p, c, u, v, inverse, angle, axial, bending, eta):  # type: ignore[no-untyped-def]
     """Derivatives of the energy by r' and by L r'' at a point, and the power lost; u, v: rates of r' and L r''."""
-    shrink = inverse_root(px * px + py * py)
-    rate, change = ux * px + uy * py, ux * cy - uy * cx + px * vy - py * vx
+    shrink = inverse_root(dot(p, p))
+    rate, change = dot(p, u), plus(wedge(u, c), 1.0, wedge(p, v))
     n, lost = stretch(damped, shrink, rate, inverse, axial, eta)
-    m, turn, more = bend(damped, shrink * shrink, px * cy - py * cx, rate, change, inverse, angle, bending, eta)
-    n = n - 2.0 * m * turn
-    return n * px + m * cy, n * py - m * cx, -m * py, m * px, lost + more
+    m, turn, more = bend(damped, shrink * shrink, wedge(p, c), rate, change, inverse, angle, bending, eta, STRAIGHT)
+    n = n - 2.0 * dot(m, turn)
+    return plus(times(n, p), 1.0, facing(c, m)), times(-1.0, facing(p, m)), lost + more
 
 
 @njit(error_model="numpy", forceinline=True)
-def collect(x, g, other, h, beyond, sums):  # type: ignore[no-untyped-def]
-    """Add the derivatives by c0 to c4 of a pair of points in one direction: g by r', h by L r'' at +xi and at -xi."""
+def _collect(x, g, other, h, beyond, sums):  # type: ignore[no-untyped-def]
+    """Add the derivatives by c0 to c4 of a pair of points: g by r', h by L r'' at +xi and at -xi."""
     s0, s1, s2, s3, s4 = sums
-    even, odd, up, down = g + other, x * (g - other), h + beyond, x * (h - beyond)
+    even, odd, up, down = (
+        plus(g, 1.0, other),
+        times(x, minus(g, other)),
+        plus(h, 1.0, beyond),
+        times(x, minus(h, beyond)),
+    )
     x2 = x * x
     return (
-        s0 + even,
-        s1 + odd + 2.0 * up,
-        s2 + x2 * even + 4.0 * down,
-        s3 + x2 * odd + (6.0 * x2) * up,
-        s4 + (x2 * x2) * even + (8.0 * x2) * down,
+        plus(s0, 1.0, even),
+        plus(plus(s1, 1.0, odd), 2.0, up),
+        plus(plus(s2, x2, even), 4.0, down),
+        plus(plus(s3, x2, odd), 6.0 * x2, up),
+        plus(plus(s4, x2 * x2, even), 8.0 * x2, down),
     )
 
 
 @njit(error_model="numpy", forceinline=True)
-def nodal(inverse, length, sums):  # type: ignore[no-untyped-def]
-    """The force in one direction on r1, r1', r1'', r2, r2', r2''."""
+def _nodal_forces(inverse, length, sums):  # type: ignore[no-untyped-def]
+    """The force on r1, r1', r1'', r2, r2', r2'', row by row."""
     s0, s1, s2, s3, s4 = sums
-    d = (_EVEN[0, 0] * s0 + _EVEN[1, 0] * s2 + _EVEN[2, 0] * s4) * inverse
-    s = _EVEN[0, 1] * s0 + _EVEN[1, 1] * s2 + _EVEN[2, 1] * s4
-    a = (_EVEN[0, 2] * s0 + _EVEN[1, 2] * s2 + _EVEN[2, 2] * s4) * length
-    u, b = _ODD[0, 0] * s1 + _ODD[1, 0] * s3, (_ODD[0, 1] * s1 + _ODD[1, 1] * s3) * length
-    return d, u - s, -(a + b), -d, -(s + u), a - b
+    d = times(inverse, plus(_combined(_EVEN[0, 0], s0, _EVEN[1, 0], s2), _EVEN[2, 0], s4))
+    s = plus(_combined(_EVEN[0, 1], s0, _EVEN[1, 1], s2), _EVEN[2, 1], s4)
+    a = times(length, plus(_combined(_EVEN[0, 2], s0, _EVEN[1, 2], s2), _EVEN[2, 2], s4))
+    u, b = _combined(_ODD[0, 0], s1, _ODD[1, 0], s3), times(length, _combined(_ODD[0, 1], s1, _ODD[1, 1], s3))
+    first = (*d, *minus(u, s), *times(-1.0, plus(a, 1.0, b)))
+    return (*first, *times(-1.0, d), *times(-1.0, plus(s, 1.0, u)), *minus(a, b))
 
 
 @njit(error_model="numpy", forceinline=True)
 def _force(
     tile: Tile,
+    space: tuple[int, ...],
     curved: bool,
     damped: bool,
     pairs: Array,
@@ -147,53 +148,39 @@ def _force(
     w: Array,
     power: Array,
 ) -> None:
-    """Add the force of `count` elements to f; curved, damped and the rule are constants of the call."""
+    """Add the force of `count` elements to f; space, curved, damped and the rule are constants of the call."""
     inverse = coefficient(tile, family, number, lane, beam.COEFFICIENTS, 0)
     ea = coefficient(tile, family, number, lane, beam.COEFFICIENTS, 1)
     ei = coefficient(tile, family, number, lane, beam.COEFFICIENTS, 2)
-    length, none = reciprocal(inverse), spread(EIGHT, 0.0)
-    eta, lost, still = none, none, (none, none, none, none, none)
-    x = component(tile, family, number, lane, ROWS, inverse, length, 0, z)
-    y = component(tile, family, number, lane, ROWS, inverse, length, 1, z)
-    dx, dy, sx, sy = still, still, still, still
+    length, eta, lost = reciprocal(inverse), spread(EIGHT, 0.0), spread(EIGHT, 0.0)
+    r = _curve(tile, space, family, number, lane, inverse, length, z)
+    still = zeros_like(r[0])
+    sums, v = (still, still, still, still, still), (still, still, still, still, still)
     if damped:
         eta = coefficient(tile, family, number, lane, beam.COEFFICIENTS, 3)
-        dx = component(tile, family, number, lane, ROWS, inverse, length, 0, zdot)
-        dy = component(tile, family, number, lane, ROWS, inverse, length, 1, zdot)
+        v = _curve(tile, space, family, number, lane, inverse, length, zdot)
     last = pairs.shape[0] - 1
-    for g in range(last):
-        xi, weight = pairs[g, 0], pairs[g, 1]
-        px, qx, cx, ex = at_both(xi, x)
-        py, qy, cy, ey = at_both(xi, y)
-        ux, tx, vx, wx = at_both(xi, dx)
-        uy, ty, vy, wy = at_both(xi, dy)
-        straight = reference(tile, curved, family, number, lane, 2 * int(pairs[g, 3]), 1.0)
-        angle = reference(tile, curved, family, number, lane, 2 * int(pairs[g, 3]) + 1, 0.0)
-        gx, gy, hx, hy, one = _point(
-            damped, px, py, cx, cy, ux, uy, vx, vy, straight, angle, ea * weight, ei * weight, eta
-        )
-        straight = reference(tile, curved, family, number, lane, 2 * int(pairs[g, 2]), 1.0)
-        angle = reference(tile, curved, family, number, lane, 2 * int(pairs[g, 2]) + 1, 0.0)
-        ix, iy, jx, jy, two = _point(
-            damped, qx, qy, ex, ey, tx, ty, wx, wy, straight, angle, ea * weight, ei * weight, eta
-        )
-        sx, sy = collect(xi, gx, ix, hx, jx, sx), collect(xi, gy, iy, hy, jy, sy)
+    for k in range(last):
+        xi, axial, bending = pairs[k, 0], ea * pairs[k, 1], ei * pairs[k, 1]
+        p, q, c, e = _at_both(xi, r)
+        u, t, a, b = _at_both(xi, v)
+        straight = reference(tile, curved, family, number, lane, 2 * int(pairs[k, 3]), 1.0)
+        angle = reference(tile, curved, family, number, lane, 2 * int(pairs[k, 3]) + 1, 0.0)
+        g, h, one = _point(damped, p, c, u, a, straight, angle, axial, bending, eta)
+        straight = reference(tile, curved, family, number, lane, 2 * int(pairs[k, 2]), 1.0)
+        angle = reference(tile, curved, family, number, lane, 2 * int(pairs[k, 2]) + 1, 0.0)
+        i, j, two = _point(damped, q, e, t, b, straight, angle, axial, bending, eta)
+        sums = _collect(xi, g, i, h, j, sums)
         lost = lost + (one + two)
     if pairs[last, 1] != 0.0:
-        weight = pairs[last, 1]
+        axial, bending = ea * pairs[last, 1], ei * pairs[last, 1]
         straight = reference(tile, curved, family, number, lane, 2 * int(pairs[last, 2]), 1.0)
         angle = reference(tile, curved, family, number, lane, 2 * int(pairs[last, 2]) + 1, 0.0)
-        px, py, cx, cy = x[0], y[0], 2.0 * x[1], 2.0 * y[1]
-        ux, uy, vx, vy = dx[0], dy[0], 2.0 * dx[1], 2.0 * dy[1]
-        gx, gy, hx, hy, one = _point(
-            damped, px, py, cx, cy, ux, uy, vx, vy, straight, angle, ea * weight, ei * weight, eta
-        )
-        sx = (sx[0] + gx, sx[1] + 2.0 * hx, sx[2], sx[3], sx[4])
-        sy = (sy[0] + gy, sy[1] + 2.0 * hy, sy[2], sy[3], sy[4])
+        p, c, u, a = r[0], times(2.0, r[1]), v[0], times(2.0, v[1])
+        g, h, one = _point(damped, p, c, u, a, straight, angle, axial, bending, eta)
+        sums = (plus(sums[0], 1.0, g), plus(sums[1], 2.0, h), sums[2], sums[3], sums[4])
         lost = lost + one
-    a, b, c, d, e, h = nodal(inverse, length, sx)
-    i, j, k, m, n, o = nodal(inverse, length, sy)
-    add_rows(tile, family, number, lane, count, w, f, (a, i, b, j, c, k, d, m, e, n, h, o))
+    add_rows(tile, family, number, lane, count, w, f, _nodal_forces(inverse, length, sums))
     if damped:
         add_sum(tile, lane, count, w, power, lost)
 
@@ -201,16 +188,16 @@ def _force(
 @njit(error_model="numpy", forceinline=True)
 def _forces(tile, curved, damped, rule, family, number, members, z, zdot, f, w, power):  # type: ignore[no-untyped-def]
     """Add the forces of `members` elements of one variant, with its constants prepared once."""
-    count = members if len(tile) == 1 else 1
+    count, space = members if len(tile) == 1 else 1, space_of(family)
     for first in range(number, number + members, count):
         for lane in range(0, len(tile) - family.spare, len(EIGHT)):
-            _force(tile, curved, damped, rule, family, first, count, lane, z, zdot, f, w, power)
+            _force(tile, space, curved, damped, rule, family, first, count, lane, z, zdot, f, w, power)
 
 
 @njit(cache=True, error_model="numpy")
 def force(tile: Tile, family: Family, z: Array, zdot: Array, f: Array, w: Array, power: Array, moving: bool) -> None:
     """See `families.add_force`."""
-    number = 0
+    number, curved = 0, len(space_of(family)) == len(PLANE)
     while number < family.size:
         members, variant = of_one_variant(family, number), family.plan[PLAN * number + VARIANT]
         at = family, number, members, z, zdot, f, w, power
@@ -219,71 +206,34 @@ def force(tile: Tile, family: Family, z: Array, zdot: Array, f: Array, w: Array,
         elif variant == FIVE:
             _forces(tile, False, False, _FIVE_PAIRS, *at)
         elif variant == FOUR_DAMPED and moving:
-            _forces(tile, True, True, _FOUR_PAIRS, *at)
+            _forces(tile, curved, True, _FOUR_PAIRS, *at)
         elif variant == FIVE_DAMPED and moving:
-            _forces(tile, True, True, _FIVE_PAIRS, *at)
+            _forces(tile, curved, True, _FIVE_PAIRS, *at)
         elif variant in (FOUR_CURVED, FOUR_DAMPED):
-            _forces(tile, True, False, _FOUR_PAIRS, *at)
+            _forces(tile, curved, False, _FOUR_PAIRS, *at)
         else:
-            _forces(tile, True, False, _FIVE_PAIRS, *at)
+            _forces(tile, curved, False, _FIVE_PAIRS, *at)
         number += members
 
 
-@njit(error_model="numpy", forceinline=True)
-def _add_energy(tile, points, family, number, count, lane, z, w, energy):  # type: ignore[no-untyped-def]
-    """Add the strain energy of `count` elements; the rule, rows (xi, weight), is a constant of the call."""
-    inverse = coefficient(tile, family, number, lane, beam.COEFFICIENTS, 0)
-    ea = coefficient(tile, family, number, lane, beam.COEFFICIENTS, 1)
-    ei = coefficient(tile, family, number, lane, beam.COEFFICIENTS, 2)
-    length, total = 1.0 / inverse, spread(EIGHT, 0.0)
-    x = component(tile, family, number, lane, ROWS, inverse, length, 0, z)
-    y = component(tile, family, number, lane, ROWS, inverse, length, 1, z)
-    for g in range(points.shape[0]):
-        px, _, cx, _ = at_both(points[g, 0], x)
-        py, _, cy, _ = at_both(points[g, 0], y)
-        square, relaxed = px * px + py * py, rest(tile, family, number, lane, 2 * g)
-        strain = root(square) * relaxed - 1.0
-        angle = (px * cy - py * cx) / square - rest(tile, family, number, lane, 2 * g + 1)
-        total = total + (0.5 * points[g, 1]) * (ea * strain * strain / relaxed + ei * angle * angle * relaxed)
-    add_sum(tile, lane, count, w, energy, total)
-
-
-@njit(cache=True, error_model="numpy")
-def potential(tile: Tile, family: Family, z: Array, w: Array, energy: Array, row: int) -> None:
-    """See `families.add_energy`."""
-    number, total = 0, shift(energy, row * len(tile))
-    while number < family.size:
-        count, variant = together(tile, family, number), family.plan[PLAN * number + VARIANT]
-        for lane in range(0, len(tile), len(EIGHT)):
-            at = family, number, count, lane, z, w, total
-            if variant in (FOUR, FOUR_CURVED, FOUR_DAMPED):
-                _add_energy(tile, _FOUR_POINTS, *at)
-            else:
-                _add_energy(tile, _FIVE_POINTS, *at)
-        number += count
-
-
-implement(
-    Quintics,
-    Kernel(ROWS, beam.COEFFICIENTS, 1),
-    force=force,
-    potential=potential,
-    stiffness=beam_tangent.stiffness,
-    viscosity=beam_tangent.viscosity,
-)
-
-
-def _nodal_vectors(rod: Rod, s: Number) -> list[Number]:
-    tangent = beam.tangent(rod, s)
-    curvature = sum(k * s**power for power, k in enumerate(rod.curvature)) + 0.0 * s
-    return [tangent, curvature * plane.quarter(tangent)]
+for _kind, _space in ((Quintics, PLANE), (SpatialQuintics, SPACE)):
+    implement(
+        _kind,
+        Kernel(len(_space) * VECTORS, beam.COEFFICIENTS, 1, _space),
+        force=force,
+        potential=beam_table.potential,
+        stiffness=beam_table.stiffness,
+        viscosity=beam_table.viscosity,
+    )
 
 
 def _part(rod: Rod, section: Section, length: Number, nodal: list[Number]) -> Entry:
     rule = recommended(rod.elements)
     kind = 2 if np.any(rod.retardation) else 1 if rod.curvature else 0
     variant = (FOUR if len(rule) == 4 else FIVE) + kind
-    return beam.part(beam.QUINTIC, rule, variant, rod, section, length, nodal)
+    return beam.part(VECTORS, rule, variant, rod, section, length, nodal)
 
 
-ELEMENT = beam.element(beam.QUINTIC, Quintics, _nodal_vectors, _part)
+ELEMENT, SPATIAL_ELEMENT = (
+    beam.element(VECTORS, family, space, _part) for family, space in ((Quintics, PLANE), (SpatialQuintics, SPACE))
+)

@@ -1,4 +1,4 @@
-"""Tension and moment at a point of a beam, for values of `simd`; theory in `beam`."""
+"""Tension and moment at a point of a beam in R^d, for values of `simd`; theory in `beam`."""
 
 from __future__ import annotations
 
@@ -6,6 +6,10 @@ from numba import njit
 
 from shoal.compile.simd import EIGHT, spread
 from shoal.mechanics.elements.batch import rest
+from shoal.mechanics.numerics.tuples import dot, minus, plus, times
+
+STRAIGHT = 1e-16
+"""Curvature times length of an element, squared, that counts as none: a rounding error of a straight element's."""
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -26,13 +30,25 @@ def stretch(damped, shrink, rate, relaxed, stiffness, eta):  # type: ignore[no-u
 
 
 @njit(error_model="numpy", forceinline=True)
-def bend(damped, flat, k, rate, change, inverse, angle, stiffness, eta):  # type: ignore[no-untyped-def]
-    """The moment over |r'|^2 at a point, its turn, and the power lost; flat: 1/|r'|^2, k: r' x L r''."""
-    stiffness = stiffness * inverse
-    turn = k * flat
-    bent, lost = turn - angle, 0.0 * flat
+def less(turn, angle):  # type: ignore[no-untyped-def]
+    """A turn less that of the stress-free shape, which is zero but in the plane."""
+    return (turn[0] - angle, *turn[1:])
+
+
+@njit(error_model="numpy", forceinline=True)
+def bend(damped, flat, k, rate, change, relaxed, angle, stiffness, eta, straight):  # type: ignore[no-untyped-def]
+    """The moment over |r'|^2 at a point, its turn, and the power lost; flat: 1/|r'|^2, k: r' ^ L r'', change: its rate.
+
+    In space only the rate of the size of the turn is damped: without a frame of the section, a turn whose plane changes
+    cannot be told from a rigid rotation. straight: `STRAIGHT` in the units of the turn.
+    """
+    stiffness = stiffness * relaxed
+    turn = times(flat, k)
+    bent, lost = less(turn, angle), 0.0 * flat
     if damped:
-        turning = (change - 2.0 * turn * rate) * flat
-        bent = bent + eta * turning
-        lost = eta * stiffness * turning * turning
-    return stiffness * bent * flat, turn, lost
+        turning = times(flat, minus(change, times(2.0 * rate, turn)))
+        if len(turn) > 1:
+            turning = times(dot(turn, turning) / (dot(turn, turn) + straight), turn)
+        bent = plus(bent, eta, turning)
+        lost = eta * stiffness * dot(turning, turning)
+    return times(stiffness * flat, bent), turn, lost
