@@ -1,4 +1,8 @@
-"""From where bodies are placed, in the plane and in space: moving points of the ground, and whose turn is next."""
+"""What the plane and space share of placing bodies: moving points of the ground, the order of bodies, point masses.
+
+The walk over the bodies stays twice (`placement`, `space.placement`): one with rules of either as parameters was 23
+lines longer, as directors, poses and what leads a body differ.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +13,8 @@ import numpy as np
 from shoal.errors import InputError
 from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.assembly.groups import JointPoint, moving
-from shoal.mechanics.assembly.pose import value_and_rate
+from shoal.mechanics.assembly.pose import Pose, value_and_rate
+from shoal.mechanics.frames import PointFrame
 from shoal.scene import GROUND, Function, Scene
 
 
@@ -41,3 +46,12 @@ def next_body(
             if is_known(name):
                 return name
     return waiting[0]
+
+
+def place_point(name: str, mine: list[JointPoint], pose: Pose, result: Placement) -> None:
+    """Give a point mass its coordinates, those of its joint if it has one."""
+    for point in mine[:1]:
+        point.where = point.where or result.make(point, pose.position, pose.velocity)
+    origin = mine[0].where if mine else result.new_vector(pose.position, pose.velocity)
+    assert origin is not None
+    result.frames[name] = PointFrame(name, origin)

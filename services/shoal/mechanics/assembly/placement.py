@@ -23,11 +23,11 @@ from shoal.mechanics.assembly.groups import (
 )
 from shoal.mechanics.assembly.holding import hold
 from shoal.mechanics.assembly.modal import place_modal
-from shoal.mechanics.assembly.order import next_body, place_driver
+from shoal.mechanics.assembly.order import next_body, place_driver, place_point
 from shoal.mechanics.assembly.pose import Pose, arm
 from shoal.mechanics.assembly.rods import place_rod, rod_axis
 from shoal.mechanics.assembly.space.start import place_started
-from shoal.mechanics.frames import Place, PointFrame, RigidFrame
+from shoal.mechanics.frames import Place, RigidFrame
 from shoal.mechanics.joints import Along, Meet
 from shoal.mechanics.modal.modes import bent
 from shoal.mechanics.numerics.tile import Array
@@ -58,7 +58,7 @@ def place(scene: Scene) -> Placement:
         result.poses[name] = pose
         body = scene.bodies[name]
         if isinstance(body, PointMass):
-            _place_point(name, mine, pose, result)
+            place_point(name, mine, pose, result)
         elif body.element == "modal":
             place_modal(scene, name, mine, pose, result)
         elif isinstance(body, Rod) and body.element != "rigid":
@@ -117,14 +117,6 @@ def _pose(scene: Scene, name: str, mine: list[JointPoint], turning: Orientations
         p, pdot = ((np.real(part), np.imag(part)) for part in (place, rate))
         velocity = velocity - arm(directors, pdot)
     return Pose(position - arm(directors, p), directors, velocity - arm(spin, p), spin)
-
-
-def _place_point(name: str, mine: list[JointPoint], pose: Pose, result: Placement) -> None:
-    for point in mine[:1]:
-        point.where = point.where or result.make(point, pose.position, pose.velocity)
-    origin = mine[0].where if mine else result.new_vector(pose.position, pose.velocity)
-    assert origin is not None
-    result.frames[name] = PointFrame(name, origin)
 
 
 def _place_rigid(name: str, mine: list[JointPoint], pose: Pose, turning: Orientations, result: Placement) -> None:

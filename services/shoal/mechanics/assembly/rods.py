@@ -14,22 +14,20 @@ from shoal.mechanics.frames import BeamFrame, Place, is_on_axis
 from shoal.mechanics.numerics.tile import Array, Number
 from shoal.scene import GROUND, Rod, Scene
 
+FIT = 1e-6
+"""Distance from its unstrained start, relative to its length, from which a rod does not fit its joints."""
+
 
 def place_rod(scene: Scene, name: str, rod: Rod, mine: list[JointPoint], pose: Pose, result: Placement) -> None:
     """Give a rod its nodes. Raises InputError where it could not start unstrained."""
     element = ELEMENTS[rod.element]
-    shared: dict[int, JointPoint] = {}
-    inner: list[JointPoint] = []
-    for point in mine:
-        p = point.local(name)
-        if point.where is not None and scene.initial_from is None:
-            _check_fit(name, rod, pose.point(rod_axis(rod, p[0])), point, result)
-        place = p[0] / rod.length * rod.elements
-        node = int(np.rint(np.asarray(place).flat[0]))
-        if np.any(np.abs(place - node) > 1e-9) or not is_on_axis(p):
-            inner.append(point)
-        else:
-            shared[node] = point
+    shared, inner = joint_nodes(name, rod, mine)
+    if scene.initial_from is None:
+        for point in mine:
+            if point.where is not None:
+                require_fit(
+                    f"initial.{name}.angle", name, rod, pose.point(rod_axis(rod, point.local(name)[0])), point, result
+                )
     nodes = []
     for node in range(rod.elements + 1):
         s = rod.length * node / rod.elements
@@ -73,13 +71,33 @@ def _clamp(scene: Scene, name: str, rod: Rod, node: int) -> Array | None:
     return None
 
 
-def _check_fit(name: str, rod: Rod, planned: Array, point: JointPoint, result: Placement) -> None:
-    """A flexible rod starts in its reference shape: raises InputError if a joint holds it somewhere else."""
+def node_of(rod: Rod, place: Place) -> int | None:
+    """The node at a place of a rod, if there is one."""
+    number = place[0] / rod.length * rod.elements
+    nearest = int(np.rint(np.asarray(number).flat[0]))
+    return nearest if np.all(np.abs(number - nearest) < 1e-9) else None
+
+
+def joint_nodes(name: str, rod: Rod, points: list[JointPoint]) -> tuple[dict[int, JointPoint], list[JointPoint]]:
+    """Joint points of a rod that are its nodes, by their number, and those beside or between them."""
+    shared: dict[int, JointPoint] = {}
+    inner: list[JointPoint] = []
+    for point in points:
+        p = point.local(name)
+        node = node_of(rod, p)
+        if node is None or not is_on_axis(p):
+            inner.append(point)
+        else:
+            shared[node] = point
+    return shared, inner
+
+
+def require_fit(field: str, name: str, rod: Rod, planned: Array, point: JointPoint, result: Placement) -> None:
+    """Raise InputError if a joint holds a rod elsewhere than where it would start unstrained, in R^d."""
     assert point.where is not None
-    held, _ = result.start_of(point.where)
-    away = np.hypot(*(held - planned))
-    if np.any(away > 1e-6 * rod.length):
+    apart = np.sqrt(np.sum((result.start_of(point.where)[0] - planned) ** 2, axis=0))
+    if np.any(apart > FIT * rod.length):
         raise InputError(
-            f"initial.{name}.angle: joint {point.name} holds {name} {np.max(away):.3g} m away from "
-            f"where the unstrained rod would start; a flexible rod starts unstrained"
+            f"{field}: joint {point.name} holds {name} {np.max(apart):.3g} m away from where the unstrained rod would "
+            "start; a flexible rod starts unstrained"
         )

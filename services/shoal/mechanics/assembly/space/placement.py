@@ -20,7 +20,7 @@ from shoal.mechanics import rotation as turns
 from shoal.mechanics.affine import Affine, combined, fixed
 from shoal.mechanics.assembly.groups import JointPoint, is_stiff, rotated, transposed
 from shoal.mechanics.assembly.holding import hold
-from shoal.mechanics.assembly.order import next_body, place_driver
+from shoal.mechanics.assembly.order import next_body, place_driver, place_point
 from shoal.mechanics.assembly.pose import Pose, arm
 from shoal.mechanics.assembly.space.axes import JointAxis
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
@@ -28,7 +28,7 @@ from shoal.mechanics.assembly.space.hinges import make_axes
 from shoal.mechanics.assembly.space.rod_joints import hold_rod
 from shoal.mechanics.assembly.space.rods import place_rod
 from shoal.mechanics.assembly.space.sections import material
-from shoal.mechanics.frames import Place, PointFrame, RigidFrame
+from shoal.mechanics.frames import Place, RigidFrame
 from shoal.mechanics.joints import Aligned, Along, InPlane, Meet, Square, Turned
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.plane import vector
@@ -52,7 +52,7 @@ def place_in_space(scene: Scene) -> SpatialPlacement:
         result.poses[name] = pose
         body = scene.bodies[name]
         if isinstance(body, PointMass):
-            _place_point(name, touching[name], pose, result)
+            place_point(name, touching[name], pose, result)
         elif isinstance(body, Rod) and body.element != "rigid":
             place_rod(scene, name, body, touching[name], pose, result)
         else:
@@ -113,14 +113,6 @@ def _guides(scene: Scene, name: str, result: SpatialPlacement) -> Iterator[tuple
             known = here.body in result.frames or (isinstance(guide, Meet) and here.body == GROUND)
             if there.body == name and known and (isinstance(guide, Meet) or here is guide.first):
                 yield here, there
-
-
-def _place_point(name: str, mine: list[JointPoint], pose: Pose, result: SpatialPlacement) -> None:
-    for point in mine[:1]:
-        point.where = point.where or result.make(point, pose.position, pose.velocity)
-    origin = mine[0].where if mine else result.new_vector(pose.position, pose.velocity)
-    assert origin is not None
-    result.frames[name] = PointFrame(name, origin)
 
 
 def _place_rigid(name: str, mine: list[JointPoint], pose: Pose, result: SpatialPlacement) -> None:

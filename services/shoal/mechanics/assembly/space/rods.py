@@ -10,31 +10,21 @@ from shoal.mechanics import rotation as turns
 from shoal.mechanics.affine import Affine, fixed
 from shoal.mechanics.assembly.groups import JointPoint
 from shoal.mechanics.assembly.pose import Pose, arm
+from shoal.mechanics.assembly.rods import FIT, joint_nodes, node_of, require_fit
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
-from shoal.mechanics.assembly.space.sections import ALIGNED, arc, material, node_of
+from shoal.mechanics.assembly.space.sections import ALIGNED, arc, material
 from shoal.mechanics.assembly.space.strained import guessed, section_at
-from shoal.mechanics.frames import BeamFrame, is_on_axis
+from shoal.mechanics.frames import BeamFrame
 from shoal.mechanics.joints import Turned
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.start.strained import gives_way, require_numbers
 from shoal.scene import GROUND, Rod, Scene
 
-FIT = 1e-6
-"""Distance from its unstrained start, relative to its length, from which a rod does not fit its joints."""
-
 
 def place_rod(scene: Scene, name: str, rod: Rod, mine: list[JointPoint], pose: Pose, result: SpatialPlacement) -> None:
     """Give a rod its nodes; they start unstrained, if joints allow it. Raises InputError where they cannot."""
     element = result.elements[name]
-    shared: dict[int, JointPoint] = {}
-    inner: list[JointPoint] = []
-    for point in mine:
-        p = point.local(name)
-        node = node_of(rod, p)
-        if node is None or not is_on_axis(p):
-            inner.append(point)
-        else:
-            shared[node] = point
+    shared, inner = joint_nodes(name, rod, mine)
     strained = gives_way(scene)
     known = {node: result.start_of(point.where)[0] for node, point in shared.items() if point.where is not None}
     guess = guessed(scene, name, rod, pose, known, result) if strained else []
@@ -50,7 +40,7 @@ def place_rod(scene: Scene, name: str, rod: Rod, mine: list[JointPoint], pose: P
                 require_numbers(scene)
             r = guess[node].place
         elif joint is not None and joint.where is not None:
-            _check_fit(name, rod, r, joint, result)
+            require_fit(f"initial.{name}", name, rod, r, joint, result)
         position = result.new_vector(r, v) if joint is None else joint.where or result.make(joint, r, v)
         vectors = [
             (arm(pose.directors, tuple(vector)), arm(pose.turning, tuple(vector)))
@@ -122,15 +112,3 @@ def _ground_clamp(scene: Scene, name: str, rod: Rod, node: int, result: SpatialP
                 continue
         return joint
     return None
-
-
-def _check_fit(name: str, rod: Rod, planned: Array, point: JointPoint, result: SpatialPlacement) -> None:
-    """Raises InputError if a joint holds a rod somewhere else than where it would start unstrained."""
-    assert point.where is not None
-    apart = np.sqrt(np.sum((result.start_of(point.where)[0] - planned) ** 2, axis=0))
-    away = np.max(apart)
-    if np.any(apart > FIT * rod.length):
-        raise InputError(
-            f"initial.{name}: joint {point.name} holds {name} {away:.3g} m away from where the unstrained rod would "
-            "start"
-        )

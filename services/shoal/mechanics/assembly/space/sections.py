@@ -9,6 +9,7 @@ import numpy as np
 from shoal.mechanics import joints
 from shoal.mechanics import rotation as turns
 from shoal.mechanics.assembly.groups import is_stiff
+from shoal.mechanics.assembly.rods import node_of
 from shoal.mechanics.assembly.space.attitudes import Attitudes, section
 from shoal.mechanics.elements import SPATIAL
 from shoal.mechanics.elements.element import Element
@@ -35,13 +36,6 @@ def material(scene: Scene, body: str, place: Place) -> Place:
     """A place of an unstrained body in its own frame [m]; of a flexible rod by its arc length."""
     rod = flexible(scene, body)
     return place if rod is None else tuple(unstrained(rod, place[0])[0])
-
-
-def node_of(rod: Rod, place: Place) -> int | None:
-    """The node at a place of a rod, if there is one."""
-    number = place[0] / rod.length * rod.elements
-    nearest = int(np.rint(np.asarray(number).flat[0]))
-    return nearest if np.all(np.abs(number - nearest) < 1e-9) else None
 
 
 def image(scene: Scene, attitudes: Attitudes, side: Attachment, axis: Any) -> Array:

@@ -16,8 +16,9 @@ from shoal.mechanics import joints
 from shoal.mechanics import rotation as turns
 from shoal.mechanics.assembly.groups import transposed
 from shoal.mechanics.assembly.pose import Pose
+from shoal.mechanics.assembly.rods import node_of
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
-from shoal.mechanics.assembly.space.sections import arc, flexible, material, node_of, turn_of
+from shoal.mechanics.assembly.space.sections import arc, flexible, material, turn_of
 from shoal.mechanics.elements.unstrained import unstrained
 from shoal.mechanics.joints import Turned
 from shoal.mechanics.numerics.tile import Array
