@@ -39,7 +39,7 @@ class _Locator(caching.UserProvidedCacheLocator):  # type: ignore[misc]
 
     def get_disambiguator(self) -> str:
         """Return the same for all functions of one name: their keys differ."""
-        return "kernel"
+        return "content"
 
 
 class _Storage(caching.CompileResultCacheImpl):  # type: ignore[misc]
@@ -50,7 +50,15 @@ class _Cache(caching.FunctionCache):  # type: ignore[misc]
     _impl_class = _Storage
 
     def _index_key(self, signature: Any, generator: Any) -> tuple[Any, ...]:
-        return (*super()._index_key(signature, generator), key(self._py_func, signature))
+        """Return a key of texts: one of types is unreadable to versions that have their classes elsewhere."""
+        _, *rest = super()._index_key(signature, generator)
+        return (" ".join(map(_text, getattr(signature, "args", signature))), *rest, key(self._py_func, signature))
+
+
+def _text(kind: Any) -> str:
+    """The name of a type, with the modules of the structures in it, as two of them may have one name."""
+    parts, own = getattr(kind, "types", None) or [getattr(kind, "dtype", None)], getattr(kind, "instance_class", None)
+    return " ".join([str(kind), *([own.__module__] if own else []), *map(_text, filter(None, parts))])
 
 
 def address_by_content(kernel: Any) -> None:
