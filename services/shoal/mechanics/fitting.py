@@ -322,20 +322,30 @@ def start_value(function: Function | Composed) -> float:
 
 def start_slope(function: Function | Composed) -> float:
     """The derivative of a function of time at t = 0, on its right side. Raises InputError."""
+    slope = _at_start(function, 1)
+    return slope if np.isfinite(slope) else value(fit(function, _BEGINNING, function.knots), 0.0, 1)
+
+
+def start_bend(function: Function | Composed) -> float:
+    """The second derivative of a function of time at t = 0, on its right side; 0 where its formula has none there."""
+    bend = 2.0 * _at_start(function, 2)
+    return bend if np.isfinite(bend) else 0.0
+
+
+def _at_start(function: Function | Composed, order: int) -> float:
+    """A Taylor coefficient of a function of time at t = 0, on its right side; nan where its formula has none."""
     stated, operations = (function.function, function.operations) if isinstance(function, Composed) else (function, ())
     if stated.number is not None:
         return 0.0
     node = stated.formula
     if node is None:  # a table
         slope = formula.make("*", stated.table_slope(0.0, left=False), "t")
-        node = formula.make("+", float(stated(np.zeros(1))[0]), slope)
+        bend = formula.make("*", 0.5 * stated.table_bend(0.0), formula.make("*", "t", "t"))
+        node = formula.make("+", float(stated(np.zeros(1))[0]), formula.make("+", slope, bend))
     for operation in operations:
         node = formula.make(operation, node)
-    low, high = derivative_at(branches(node, 0.0, _BEGINNING).nodes[0], np.zeros(1))
-    slope = float(low[1, 0] + high[1, 0]) / 2
-    if np.isfinite(slope):
-        return slope
-    return value(fit(function, _BEGINNING, function.knots), 0.0, 1)
+    low, high = derivative_at(branches(node, 0.0, _BEGINNING).nodes[0], np.zeros(1), order)
+    return float(low[order, 0] + high[order, 0]) / 2
 
 
 def require_no_jump(function: Function, horizon: float) -> None:

@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from shoal.mechanics.affine import Affine
-from shoal.mechanics.fitting import start_slope, start_value
+from shoal.mechanics.fitting import start_bend, start_slope, start_value
 from shoal.mechanics.numerics.tile import Array, Index
 from shoal.mechanics.terms import Term
 
@@ -38,6 +38,7 @@ class TermValues:
         self._form = np.array([one.form for _, one in products]).reshape(-1, dimensions, dimensions)
         self._roots = np.isin(self._products, _index(roots))
         self._constant = laned([vector.constant.T for _, vector in vectors], (dimensions,))
+        self._drives = [one.drive for one in terms]
         drives = [0.0 if one.drive is None else start_value(one.drive) for one in terms]
         constants = [np.atleast_1d(one.constant + drive) for one, drive in zip(terms, drives, strict=True)]
         self.offset = laned(constants, ())
@@ -46,6 +47,11 @@ class TermValues:
         """Derivatives of the terms by time at coordinates that rest, (terms,)."""
         self.rows, self._numbers, self.unknowns, self._coefficients, self.groups = _links(vectors, dimensions)
         """Of every part of the Jacobian its term and unknown; groups: of parts no two of which are of the same term."""
+
+    @property
+    def bend(self) -> Array:
+        """Second derivatives of the terms by time at coordinates that rest, (terms,)."""
+        return np.array([0.0 if drive is None else start_bend(drive) for drive in self._drives])
 
     def of_lane(self, lane: int) -> TermValues:
         """Return the terms of one lane."""

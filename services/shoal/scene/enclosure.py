@@ -41,11 +41,11 @@ def enclose(node: Node, lower: Array, upper: Array, order: int) -> Pair:
         return _enclose(node, Span(lower, upper, (upper - lower) / 2), order)
 
 
-def at(node: Node, t: Array) -> Pair:
-    """Bounds on the value and the derivative of a tree at points t (points,)."""
+def at(node: Node, t: Array, order: int = 1) -> Pair:
+    """Bounds on the Taylor coefficients f, f', f''/2, ... up to an order of a tree at points t (points,)."""
     t = np.asarray(t, dtype=float)
     with np.errstate(all="ignore"):
-        return _enclose(node, Span(t, t, np.ones_like(t)), 1)
+        return _enclose(node, Span(t, t, np.ones_like(t)), order)
 
 
 def common_zero(above: Node, below: Node, t: float) -> bool:

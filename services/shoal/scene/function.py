@@ -169,6 +169,11 @@ class Function(Record):
             return float(self._spline()(t, 1))
         return float((values[row + 1] - values[row]) / (times[row + 1] - times[row]))
 
+    def table_bend(self, t: float) -> float:
+        """The second derivative of a table at one time [s]; 0 of one that is not smooth, and outside."""
+        assert self.table is not None
+        return float(self._spline()(t, 2)) if self.smooth and self.table[0][0] <= t <= self.table[-1][0] else 0.0
+
     def _spline(self) -> Any:
         # Importing scipy takes longer than reading a scene.
         from scipy.interpolate import CubicSpline

@@ -11,6 +11,7 @@ such a velocity would leave the machine no acceleration at all. So v is first pr
 u' C_qq x x / |x|^2 in the mass metric). At rest the tangent is the direction of the acceleration, which satisfies
 u' C_qq a a = 0 by the fourth derivative: a fixed point of the tangent and the acceleration of least constraint along
 it, sought from the minimiser first, then from other directions. Where no branch accelerates, the machine stays at rest.
+A drive that sets out from rest adds C_tttt: u' C_qq a a = -u' C_tttt / 3.
 """
 
 from __future__ import annotations
@@ -37,6 +38,9 @@ ON_CONE = 1e-3
 """Largest distance from the cone of a tangent of a branch."""
 AWAY = 0.1
 """A velocity that its projection changes by more than this fraction is round-off where the machine hardly moves."""
+FAR = 1e3
+"""Distance of a start, relative to the minimiser, from which Newton's method ends at the outer root of its side; it
+halves each time, ten of ROUNDS."""
 SLOWEST = 1e-9
 """Acceleration along a branch, relative to that without its rows, that is none."""
 SETTLED = 1e-9
@@ -128,9 +132,18 @@ def follow(
             return rank, False
     _accelerate(tile, m, w, s, forces, lane, first)
     size = _largest(width, n, lane, w.extra)
-    for seed in range(-1, n):
+    driven = _is_driven(m, t, np.int64(ACCELERATION))
+    for seed in range(-1, 2 * n if driven else n):
+        if driven:
+            _accelerate(tile, m, w, s, forces, lane, first)
+            for i in range(n):
+                w.branch[i * width + lane] = w.extra[i * width + lane]
         if seed >= 0:
-            _direct(tile, m, w, s, lane, first, seed)
+            _direct(tile, m, w, s, lane, first, seed % n)
+        if driven and seed >= 0:  # the drive sets how fast: what is free is only added
+            share = (FAR if seed < n else -FAR) * size / _largest(width, n, lane, w.extra)
+            for i in range(n):
+                w.extra[i * width + lane] = w.branch[i * width + lane] + share * w.extra[i * width + lane]
         rank, off = _settle(tile, m, w, s, t, forces, lane, first, SLOWEST * size)
         if off <= ON_CONE:
             return rank, False
@@ -224,7 +237,8 @@ def _rows(
 ) -> tuple[int, float]:
     """Extend the basis by the rows u' C_qq x of the tangent x in w.branch.
 
-    Returns the new rank and the distance of x from the cone, |u' C_qq x x + u' C_tt| relative to the size of its terms.
+    Returns the new rank and the distance of x from the cone, |u' C_qq x x + u' C_tt| relative to the size of its terms;
+    of an acceleration C_tttt / 3 takes the place of C_tt.
     order: VELOCITY or ACCELERATION. approaching: the targets, which go into `wanted`, bring the tangent onto the cone;
     otherwise they are those of the acceleration. Where no drive moves, x is known up to its length, and rows are taken
     of u' C_qq x x / |x|^2, whose gradient vanishes along x.
@@ -232,12 +246,7 @@ def _rows(
     width, n, count, c = len(tile), m.unknowns, m.constraints.size, m.constraints
     derive(tile, m.derived, w.branch, n, m.held_rows, True)
     constraints.jacobian(tile, c, w.branch, 0.0, w.turning)
-    driven = False
-    for k in range(count):
-        if c.drive[k] >= 0:
-            driven = driven or functions.evaluate(m.functions, c.drive[k], t, 2) != 0.0
-            driven = driven or (order == VELOCITY and functions.evaluate(m.functions, c.drive[k], t, 1) != 0.0)
-    square = 0.0
+    driven, square = _is_driven(m, t, order), 0.0
     for i in range(n):
         square += w.branch[i * width + lane] ** 2
     size = _largest(width, n, lane, w.branch)
@@ -249,6 +258,8 @@ def _rows(
             if c.drive[k] >= 0 and order == VELOCITY:
                 bend += s.weights[k] * functions.evaluate(m.functions, c.drive[k], t, 2)
                 kick += s.weights[k] * functions.evaluate(m.functions, c.drive[k], t, 3)
+            elif c.drive[k] >= 0:
+                bend += s.weights[k] * functions.evaluate(m.functions, c.drive[k], t, 4) / 3.0
         crossing.turn(tile, m, w, s.weights, lane, w.extra)
         pace = constraints.pace(tile, c, s.weights, w.branch, lane)
         if not _largest(width, n, lane, w.extra) > STILL * pace:
@@ -279,6 +290,18 @@ def _rows(
             s.row[i] = w.extra[i * width + lane]
         rank = projection.extend(rank, s.rows, wanted, s.row, target, share)
     return rank, off
+
+
+@njit(cache=True, error_model="numpy")
+def _is_driven(m: Arrays, t: float, order: int) -> bool:
+    """Return whether a drive moves, so that the tangent has its length by it; order: VELOCITY or ACCELERATION."""
+    for k in range(m.constraints.size):
+        number = m.constraints.drive[k]
+        if number >= 0 and functions.evaluate(m.functions, number, t, 2) != 0.0:
+            return True
+        if number >= 0 and order == VELOCITY and functions.evaluate(m.functions, number, t, 1) != 0.0:
+            return True
+    return False
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)

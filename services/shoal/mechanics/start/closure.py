@@ -130,6 +130,16 @@ class Closure:
         other._at_start = one_lane(self._values_at_start, lane)
         return other
 
+    @property
+    def is_carried(self) -> bool:
+        """Return whether a point or direction that joints hold moves in its body, as one of a moving ground."""
+        return bool(np.any(self._rates))
+
+    @property
+    def bend(self) -> Array:
+        """Second derivatives of the joints by time at poses that rest, of their drives, (rows,)."""
+        return self._terms.bend
+
     def rows(self, u: Array | Poses) -> Rows:
         """All joints at poses."""
         poses = Poses.of(u)

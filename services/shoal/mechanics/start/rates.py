@@ -105,7 +105,7 @@ class Velocities:
         ok = np.ones(self.lanes, dtype=bool)
         units = np.tile([self.size, self.size, 1.0], rates.shape[1] // 3)
         singular = closed < len(keep) or bool(np.any(basis.dependent))
-        if not singular or self.flexible or len(keep) > _LARGEST or np.any(self.rows.rate):
+        if not singular or self.flexible or len(keep) > _LARGEST or self.closure.is_carried:
             return rates, ok
         for lane in np.flatnonzero(basis.dependent & (np.max(np.abs(rates), axis=1) > AGREES * self.speed / self.size)):
             slope = self.rows.slope[lane, keep] * units
@@ -122,7 +122,7 @@ class Velocities:
 
 
 class _Bend(NamedTuple):
-    """Second derivative of dependent joints along a motion, w . d2C/dt2 = v' (w . C_qq) v.
+    """Second derivative of dependent joints along a motion, w . d2C/dt2 = v' (w . C_qq) v + w . C_tt.
 
     units: of the poses, the machine's size [m] and 1 rad, (3 bodies,)
     """
@@ -139,7 +139,8 @@ class _Bend(NamedTuple):
         shifts = step * np.array([-2.0, -1.0, 1.0, 2.0])
         u = self.poses + shifts[:, None] * v
         slopes = self.closure.rows(u).slope[:, self.keep] @ v
-        return np.asarray(self.null @ (np.array([1.0, -8.0, 8.0, -1.0]) @ slopes / (12 * step)))
+        bend = np.array([1.0, -8.0, 8.0, -1.0]) @ slopes / (12 * step)
+        return np.asarray(self.null @ (bend + self.closure.bend[self.keep]))
 
     def nearest(self, v: Array, free: Array, scale: float) -> Array | None:
         """Rates on a branch: of those found from several starts the nearest to v in the given directions."""
