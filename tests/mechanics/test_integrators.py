@@ -14,7 +14,7 @@ from shoal.errors import InputError
 from shoal.mechanics import stability, workspace
 from shoal.mechanics.assembly.build import build
 from shoal.mechanics.integrators import INTEGRATORS, Choice, facts
-from shoal.mechanics.machine import check_step
+from shoal.mechanics.runs import check_step
 from shoal.mechanics.simulate import simulate
 from shoal.scene import Scene, load_scene
 from shoal.trajectory import Status

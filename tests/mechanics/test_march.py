@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 from shoal.mechanics.integrators import INTEGRATORS, Choice, halting
+from shoal.mechanics.machine import Machine
 from shoal.mechanics.marched import frame_type, framed, loop_of
 from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import SINGLE, WIDE, Tile
-from shoal.mechanics.simulate import machine, simulate
+from shoal.mechanics.simulate import simulate
 from shoal.mechanics.workspace import Workspace, at_start, gathered
 from shoal.scene import load_scene
 
@@ -35,7 +36,7 @@ def _frame(model: Model, integrator: str, tile: Tile) -> Any:
 def test_frames_of_one_loop_are_of_one_type(tile: Tile) -> None:
     found: dict[Any, Any] = {}
     for name in SCENES:
-        model = machine(load_scene(name), 1e-3).model
+        model = Machine.of(load_scene(name)).model(1e-3)
         for integrator in INTEGRATORS:
             frame = _frame(model, integrator, tile)
             assert found.setdefault(loop_of(frame), frame_type(frame)) == frame_type(frame), (name, integrator)
@@ -54,12 +55,12 @@ def test_a_block_holds_every_number_once() -> None:
 
 
 def test_a_workspace_forgets_its_last_run() -> None:
-    kept = machine(load_scene("andrews-squeezer"), 0.01)
-    solver, lane = kept.scene.solver, slice(0, 1)
-    halts = halting(solver, kept.model, "radau5", 0.01)
-    space = Workspace(solver, kept.model, Choice("radau5", "", np.inf), SINGLE, lane, np.array([0.01]), halts)
-    first = [np.array(part) for part in space.run(kept.model, lane)]
-    second = space.run(kept.model, lane)
+    machine = Machine.of(load_scene("andrews-squeezer"))
+    solver, model, lane = machine.scene.solver, machine.model(0.01), slice(0, 1)
+    halts = halting(solver, model, "radau5", 0.01)
+    space = Workspace(solver, model, Choice("radau5", "", np.inf), SINGLE, lane, np.array([0.01]), halts)
+    first = [np.array(part) for part in space.run(model, lane)]
+    second = space.run(model, lane)
     for one, other in zip(first, second, strict=True):
         np.testing.assert_array_equal(one, other)
 

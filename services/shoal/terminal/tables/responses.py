@@ -122,7 +122,7 @@ def _limit(judged: Judged) -> None:
             f"  by {judged.passing.why}; {judged.evaluations} runs",
             style="bold",
         )
-        how = "most probably with"
+        how = "most probably with" if judged.passing.points else "nearest with"
     else:
         undecided = f"{judged.limit.verdict(True)} in all runs {at}, which proves nothing"
         undecided = f"is not decided {at}: {judged.reason_to_doubt}" if judged.hidden else undecided
