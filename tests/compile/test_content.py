@@ -140,3 +140,46 @@ def test_a_kernel_depends_on_the_kind_of_structure_that_it_is_compiled_for() -> 
     assert rk4.step.py_func in reached(rk4.Rk4) - reached(leapfrog.Leapfrog)
     assert leapfrog.step.py_func in reached(leapfrog.Leapfrog) - reached(rk4.Rk4)
     assert content.key(loop.py_func, "Rk4") != content.key(loop.py_func, "Leapfrog")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("integrator", ["rk4", "radau5"])
+def test_the_key_follows_all_that_the_compiler_compiles(integrator: str, tmp_path: Path) -> None:
+    """Numba is the judge: each kernel that it compiles as a part of another one is among those the key follows."""
+    code = JUDGE.format(integrator=integrator)
+    place = {"SHOAL_HOME": str(tmp_path), "PYTHONDONTWRITEBYTECODE": "1"}
+    done = subprocess.run([sys.executable, "-c", code], env=place, capture_output=True, text=True, check=True)
+    parts, missed = map(int, done.stdout.split())
+    assert parts > 20
+    assert missed == 0
+
+
+JUDGE = """
+import sys
+from numba.core.dispatcher import Dispatcher
+from shoal.compile import content
+from shoal.mechanics import warm
+from shoal.scene import load_scene
+
+def compiled():
+    modules = [module for name, module in list(sys.modules.items()) if name.startswith("shoal.")]
+    found = (value for module in modules for value in vars(module).values() if isinstance(value, Dispatcher))
+    return {{value.py_func: len(value.overloads) for value in found}}
+
+def followed(function, chosen):
+    seen, pending = set(), [function]
+    while pending:
+        one = pending.pop()
+        if one not in seen:
+            seen.add(one)
+            pending += content._parts(one, chosen)[1]
+    return seen
+
+scene = load_scene("parallelogram").with_values({{"solver.integrator": "{integrator}"}})
+kernel = next(one for one in warm.required(scene, 1) if one.name == "loop")
+before = compiled()
+warm.loop.compile(kernel.kinds)
+parts = {{function for function, count in compiled().items() if count > before.get(function, 0)}}
+kinds = {{kind for pairs in content.ALTERNATIVES.values() for kind, _ in pairs if kind.__name__ in str(kernel.kinds)}}
+print(len(parts), len(parts - followed(warm.loop.py_func, frozenset(kinds))))
+"""
