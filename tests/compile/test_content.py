@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import os
 import subprocess
 import sys
 from collections.abc import Callable
@@ -119,6 +120,27 @@ def test_every_kernel_of_the_library_has_a_key() -> None:
     read = [value for function in every for value in function.__globals__.values()]
     made_by = {value._defn.__module__ for value in read if isinstance(value, _Intrinsic)}
     assert made_by <= {f"shoal.compile.{name}" for name in content._INSTRUCTIONS}
+
+
+KEYS = """
+import hashlib, sys
+from numba.core.dispatcher import Dispatcher
+from shoal.compile import content
+from shoal.engines.tree import march
+from shoal.mechanics import warm
+modules = [module for name, module in sorted(sys.modules.items()) if name.startswith("shoal.")]
+kernels = [value.py_func for module in modules for value in vars(module).values() if isinstance(value, Dispatcher)]
+print(hashlib.sha256("".join(content.key(kernel, ()) for kernel in kernels).encode()).hexdigest())
+"""
+
+
+def test_all_processes_have_the_same_keys() -> None:
+    """The order of a set, as of the options of fast mathematics, is another in each process."""
+    environments = [os.environ | {"PYTHONHASHSEED": seed} for seed in ("0", "1")]
+    runs = [subprocess.Popen([sys.executable, "-c", KEYS], env=one, stdout=subprocess.PIPE) for one in environments]
+    one, other = (run.communicate()[0] for run in runs)
+    assert len(one) > 60
+    assert one == other
 
 
 def test_a_kernel_depends_on_the_kind_of_structure_that_it_is_compiled_for() -> None:

@@ -112,12 +112,12 @@ def _parts(function: FunctionType, chosen: frozenset[type]) -> tuple[bytes, list
     digest = hashlib.sha256(f"{function.__module__}.{function.__qualname__} {function.__defaults__}".encode())
     callees, names = _overloads(function), list[str]()
     for code in _codes(function.__code__):
-        constants = [one for one in code.co_consts if not isinstance(one, CodeType) and one != function.__doc__]
-        digest.update(code.co_code + repr((constants, code.co_names, code.co_varnames)).encode())
+        constants = tuple(one for one in code.co_consts if not isinstance(one, CodeType) and one != function.__doc__)
+        digest.update(code.co_code + _constant((constants, code.co_names, code.co_varnames)))
         names += code.co_names
     for name, value in sorted(_globals(function, names).items()):
         if isinstance(value, Dispatcher):
-            digest.update(f"{name}: {value.targetoptions}".encode())
+            digest.update(f"{name}: ".encode() + _constant(value.targetoptions))
             callees.append(value.py_func)
         elif isinstance(value, FunctionType) and value.__module__.startswith(_OWN):
             callees.append(value)
@@ -160,6 +160,8 @@ def _constant(value: Any) -> bytes:
         return f"{value.dtype}{value.shape}".encode() + value.tobytes()
     if isinstance(value, tuple):
         return repr(type(value)).encode() + b",".join(map(_constant, value))
+    if isinstance(value, set | frozenset):  # each process has its own order
+        return b"{" + b",".join(sorted(map(_constant, value))) + b"}"
     if isinstance(value, dict):
         return b";".join(_constant(key) + b":" + _constant(part) for key, part in value.items())
     if isinstance(value, type):
