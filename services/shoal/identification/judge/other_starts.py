@@ -16,6 +16,7 @@ import numpy as np
 
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.rivals import turn_of_samples
+from shoal.mechanics.numerics.newton import newton
 from shoal.mechanics.rotation import of_vector, vector_of
 from shoal.scene import RigidBody, Scene
 from shoal.scene.dimensions import padded
@@ -198,20 +199,23 @@ class _Start:
     def _reached(self, wanted: Wanted) -> Array | None:
         """The point (parameters,) whose start has these numbers; None where there is none."""
         parameters, paths = self.model.parameters, list(wanted)
+        if not paths:
+            return None
         target = np.array([wanted[path] for path in paths])
-        values = parameters.to_values(self.point)
-        for _ in range(_STEPS if paths else 0):
+
+        def correct(values: Array) -> tuple[Array, float]:
             off = target - self._made(values[None], paths)[0]
             if np.all(np.abs(off) <= _OFF * (1.0 + np.abs(target))):
-                return parameters.to_vector(values)
-            if not np.all(np.isfinite(off)):
-                break
+                return np.zeros_like(values), 0.0
             # In place of derivatives, which ties have none of: differences, exact where they are linear.
             steps = 1e-3 * (1.0 + np.abs(values))
             slope = (self._made(values + np.diag(steps), paths) - self._made(values[None], paths)).T / steps
             slope = np.where(self._free & np.isfinite(slope), slope, 0.0)
-            values = values + np.linalg.lstsq(slope, off)[0]
-        return None
+            move = np.linalg.lstsq(slope, off)[0]
+            return move, float(np.max(np.abs(move) / steps))
+
+        found = newton(correct, parameters.to_values(self.point), close=0.0, most=_STEPS)
+        return parameters.to_vector(found.point) if found.converged else None
 
     @cached_property
     def _free(self) -> Array:

@@ -30,6 +30,7 @@ from shoal.mechanics.analysis.freedom import Freedom, Metric
 from shoal.mechanics.analysis.small_motions import ROUND, Tangent
 from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.frames import BeamFrame, ModalFrame, RigidFrame
+from shoal.mechanics.numerics.newton import newton
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
 from shoal.scene import Scene
@@ -499,11 +500,12 @@ def _state(steady: Steady, s: float) -> tuple[Array, Array, Array, float]:
 def _sought(begun: Steady, twists: Twists, size: float) -> Steady | None:
     """The steady motion of the same field near the start, by Newton's method; None where there is none."""
     mass = sum(float(body.mass) for body in begun.scene.bodies.values())
-    found, unit, last = begun, size * np.sqrt(mass), np.inf
-    for _ in range(MOST):
+    unit = size * np.sqrt(mass)
+
+    def correct(found: Steady) -> tuple[Array, float]:
         seen = found.here()
         if np.linalg.norm(seen.unbalanced) <= ROUND * seen.size and np.max(np.abs(seen.gap), initial=0.0) < CLOSE:
-            return found
+            return np.zeros_like(found.q), 0.0
         scaled = _Scaled(found, seen)
         matrix = scaled.stiffness(found.stiffness(seen).matrix)
         back = seen.freedom.shift(-seen.gap)
@@ -511,17 +513,23 @@ def _sought(begun: Steady, twists: Twists, size: float) -> Steady | None:
         left, sizes, ways = np.linalg.svd(matrix)
         rank = int(np.sum(sizes > LOOSE))
         y = scaled.weight * (ways[:rank].T @ (left[:, :rank].T @ right / sizes[:rank]))
-        q = found.q + back + scaled.modes @ y
-        moved, _ = twists.fastest(q - begun.q, size)
-        if not moved < NEAR * size:
-            return None
-        found = replace(found, q=q, v=found.matrix @ q + found.constant, moved=moved)
-        correction = float(np.linalg.norm(y)) / unit + float(np.max(np.abs(back), initial=0.0))
-        if correction < CLOSE or (correction < STALLED and correction > 0.3 * last):
-            seen = found.here()
-            return found if np.linalg.norm(seen.unbalanced) <= BALANCED * max(seen.size, 1e-300) else None
-        last = correction
-    return None
+        correction = back + scaled.modes @ y
+        is_near = way(found.q + correction) < NEAR * size
+        unmet = float(np.linalg.norm(y)) / unit + float(np.max(np.abs(back), initial=0.0))
+        return correction, unmet if is_near else np.inf
+
+    def way(q: Array) -> float:
+        return float(twists.fastest(q - begun.q, size)[0])
+
+    def move(found: Steady, correction: Array) -> Steady:
+        q = found.q + correction
+        return replace(found, q=q, v=found.matrix @ q + found.constant, moved=way(q))
+
+    found, converged, *_ = newton(correct, begun, close=CLOSE, round_off=STALLED, most=MOST, move=move)
+    if not converged:
+        return None
+    seen = found.here()
+    return found if np.linalg.norm(seen.unbalanced) <= BALANCED * max(seen.size, 1e-300) else None
 
 
 def _compare(found: Steady) -> tuple[float, str]:

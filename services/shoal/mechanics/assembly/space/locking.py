@@ -16,6 +16,7 @@ import numpy as np
 
 from shoal.errors import InputError
 from shoal.mechanics.assembly.space.values import uncancelled
+from shoal.mechanics.numerics.newton import newton
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.term_values import TermValues
 from shoal.mechanics.terms import Term
@@ -34,7 +35,6 @@ _WAY = 0.05
 """How far the machine is taken along the motion that is nearly free; a director has unit length."""
 _SAME = 10.0
 """The joints may gape there by so many times what they do to first order."""
-_ITERATIONS = 20
 _SHARE = 1e-3
 """Part in a dependence, squared, from which a row counts as one of those that make it."""
 
@@ -101,7 +101,7 @@ def lock(gap: Callable[[Array], Array], slope: Callable[[Array], Array], q: Arra
     """
     left, sizes, right = np.linalg.svd(slope(q), full_matrices=False)
     for k in np.flatnonzero((sizes > LEAST) & (sizes < MOST))[::-1]:
-        there = _followed(gap, slope, q + _WAY * right[k])
+        there = _closed(gap, slope, q + _WAY * right[k])
         gapes = float(np.max(np.abs(gap(there))))
         depends = np.any(np.linalg.svd(slope(there), compute_uv=False) < _SAME * sizes[k])
         moved = float(np.linalg.norm(there - q))
@@ -110,11 +110,11 @@ def lock(gap: Callable[[Array], Array], slope: Callable[[Array], Array], q: Arra
     return None
 
 
-def _followed(gap: Callable[[Array], Array], slope: Callable[[Array], Array], q: Array) -> Array:
-    """Near q, where all closes but what nearly depends on the rest (Gauss and Newton's method)."""
-    for _ in range(_ITERATIONS):
+def _closed(gap: Callable[[Array], Array], slope: Callable[[Array], Array], q: Array) -> Array:
+    """Return coordinates near q that meet all constraints but those that nearly depend on others (Gauss-Newton)."""
+
+    def correct(q: Array) -> tuple[Array, float]:
         move = np.linalg.lstsq(slope(q), -gap(q), MOST)[0]
-        q = q + move
-        if float(np.max(np.abs(move))) < LEAST:
-            break
-    return q
+        return move, float(np.max(np.abs(move)))
+
+    return newton(correct, q, close=LEAST).point
