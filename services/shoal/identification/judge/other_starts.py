@@ -199,23 +199,28 @@ class _Start:
     def _reached(self, wanted: Wanted) -> Array | None:
         """The point (parameters,) whose start has these numbers; None where there is none."""
         parameters, paths = self.model.parameters, list(wanted)
-        if not paths:
-            return None
         target = np.array([wanted[path] for path in paths])
 
+        def left(values: Array) -> Array:
+            return np.asarray(target - self._made(values[None], paths)[0])
+
+        def met(off: Array) -> bool:
+            return bool(np.all(np.abs(off) <= _OFF * (1.0 + np.abs(target))))
+
         def correct(values: Array) -> tuple[Array, float]:
-            off = target - self._made(values[None], paths)[0]
-            if np.all(np.abs(off) <= _OFF * (1.0 + np.abs(target))):
+            if met(off := left(values)):
                 return np.zeros_like(values), 0.0
             # In place of derivatives, which ties have none of: differences, exact where they are linear.
             steps = 1e-3 * (1.0 + np.abs(values))
             slope = (self._made(values + np.diag(steps), paths) - self._made(values[None], paths)).T / steps
             slope = np.where(self._free & np.isfinite(slope), slope, 0.0)
-            move = np.linalg.lstsq(slope, off)[0]
+            move = np.asarray(np.linalg.lstsq(slope, off)[0], dtype=float)
             return move, float(np.max(np.abs(move) / steps))
 
-        found = newton(correct, parameters.to_values(self.point), close=0.0, most=_STEPS)
-        return parameters.to_vector(found.point) if found.converged else None
+        if not paths:
+            return None
+        values = newton(correct, parameters.to_values(self.point), close=0.0, most=_STEPS).point
+        return parameters.to_vector(values) if met(left(values)) else None
 
     @cached_property
     def _free(self) -> Array:

@@ -4,7 +4,8 @@ Deuflhard, Newton Methods for Nonlinear Problems, Springer 2011, chapters 2 and 
 corrections, in a unit of the caller, and not by residuals, whose units differ (affine invariance). A correction
 estimates the error of the point before it. As corrections of a converging iteration shrink ever faster, one that is
 small and does not shrink is round-off of the residual, magnified by the inverse of the Jacobian: no later one would be
-better.
+better. Where there are more equations than unknowns corrections vanish at a least-squares minimum as well, so that the
+residual has to be checked at the end.
 """
 
 from __future__ import annotations

@@ -92,8 +92,8 @@ class Closure:
     """The joints of a scene. begin: poses (lanes, 3 bodies) at which joints without a value of their own hold.
 
     own: whether joints that keep what the start gives them (a weld without an angle, a distance without a length)
-    hold at `begin`, or take any value there is. bodies: that the conditions refer to, by
-    default those of the plane
+    hold at `begin`, or take any value there is. bodies: that the conditions refer to, by default those of the plane.
+    names, angular: of every row its joint, and whether its gap is an angle
     """
 
     def __init__(self, scene: Scene, begin: Array | Poses, own: bool = True, bodies: RigidBodies | None = None) -> None:
@@ -101,8 +101,8 @@ class Closure:
         bodies = RigidBodies(scene) if bodies is None else bodies
         held, marks, d = bodies.terms.held, bodies.marks, scene.dimensions
         self._terms = TermValues(held, d, bodies.lengths, counted=d == 2)
-        self._names, self._bodies = tuple(one.name for one in held), len(bodies.owners)
-        self._angular = np.array([one.lengths == 0 for one in held], dtype=bool)
+        self.names, self._bodies = tuple(one.name for one in held), len(bodies.owners)
+        self.angular = np.array([one.lengths == 0 for one in held], dtype=bool)
         self._wrapping = bodies.wrapping
         self._of_start, self._kept = list(bodies.of_start), list(bodies.of_start.values())
         is_free = [one is None or one.is_of_start for one in self._kept]
@@ -162,7 +162,7 @@ class Closure:
                 rate[:, rows] += drift[:, part]
             of_body = bodies >= 0
             parts.append((rows[of_body], bodies[of_body], by_pose[:, part][:, of_body]))
-        return Rows(gap, rate, self._names, self._angular, parts, self._bodies)
+        return Rows(gap, rate, self.names, self.angular, parts, self._bodies)
 
     def _evaluate(self, poses: Poses) -> tuple[Array, Array, Array | None]:
         """The components of all vectors at poses, (lanes, d vectors), and their derivatives, (lanes, vectors, d, ...).

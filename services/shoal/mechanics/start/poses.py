@@ -13,7 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from shoal.mechanics.joints import of_scene
-from shoal.mechanics.numerics.tile import Array, Flags
+from shoal.mechanics.numerics.levenberg_marquardt import levenberg_marquardt
+from shoal.mechanics.numerics.tile import Array, Flags, Index
 from shoal.mechanics.reach import extents, span
 from shoal.mechanics.start.closure import Closure
 from shoal.mechanics.start.walk import Walk, guessed_angles
@@ -32,8 +33,10 @@ FEWER = 8
 """While a contradiction is narrowed down, in half of the iterations."""
 _SHAKEN = 1200
 """Poses of all guesses of one machine together: to shake a long chain at random hardly ever helps."""
-_PATIENCE, _STANDS = 8, 0.99
-"""In so many steps a search that does not stand still lowers its gaps to less than this part."""
+GAIN = 1e-6
+"""A step that promises to lower the squared gaps by less than this part ends a search: nothing near closes."""
+SMALLEST = 1e-13
+"""Of the damping, so that equations of rows that depend on others can be solved."""
 DEPENDENT = 1e-6
 """Part of a pose that the joints leave free, below which they determine it."""
 
@@ -190,48 +193,31 @@ class Assembly:
         self, closure: Closure, u: Array, fixed: Flags, weight: Array | None = None, most: int = ITERATIONS
     ) -> tuple[Array, Array]:
         """Poses from u on with some held, and the largest gap left [1], (lanes,). weight: of every row; most: steps."""
-        free = np.where(fixed, 0.0, self.give)
-        u = u.copy()
-        rows = closure.rows(u)
-        if not len(rows.names):
+        if not closure.names:
             return u, np.zeros(len(u))
-        length = np.where(rows.angular, 1.0, self.size) / (1.0 if weight is None else weight)
-        gap = rows.gap / length
-        norm = np.linalg.norm(gap, axis=1)
-        damping = np.full(len(u), 1e-3)
-        running = norm > 1e-15
-        if not np.any(running):
-            return u, np.max(np.abs(gap), axis=1)
-        slope = rows.slope / length[:, None]
-        before = np.full(len(u), np.inf)
-        for iteration in range(most):
-            if not np.any(running):
-                break
-            each = slope * free[:, None, :]
-            matrix = each @ slope.transpose(0, 2, 1)
-            scale = np.sqrt(np.einsum("lkk->lk", slope * self.give @ slope.transpose(0, 2, 1)))
+        free = np.broadcast_to(np.where(fixed, 0.0, self.give), u.shape)
+        length = np.where(closure.angular, 1.0, self.size) / (1.0 if weight is None else weight)
+
+        def evaluate(poses: Array, lanes: Index) -> tuple[Array, Array]:
+            every = u.copy()
+            every[lanes] = poses
+            rows = closure.rows(every)
+            self.effort += len(rows.names)
+            return (rows.gap / length)[lanes], (rows.slope / length[:, None])[lanes]
+
+        def solve(gap: Array, slope: Array, damping: Array, lanes: Index) -> Array:
+            # Displacements of least size, J W J' + mu |gap| in units of the rows (Yamashita and Fukushima 2001).
+            each = slope * free[lanes, None, :]
+            scale = np.sqrt(np.einsum("lki,i,lki->lk", slope, self.give, slope))
             scale = np.where(scale > 0, scale, 1.0)  # what closes a rod upon itself depends on no pose
-            matrix = matrix / scale[:, :, None] / scale[:, None, :]
-            small = np.clip(damping * norm, 1e-13, 1e3)
+            matrix = each @ slope.transpose(0, 2, 1) / scale[:, :, None] / scale[:, None, :]
+            small = np.maximum(damping * np.linalg.norm(gap, axis=1), SMALLEST)
             matrix += small[:, None, None] * np.eye(matrix.shape[1])
             multiplier = np.linalg.solve(matrix, (gap / scale)[..., None])[..., 0] / scale
-            step = -np.einsum("lki,lk->li", each, multiplier)
-            ahead = u + np.where(running[:, None], step, 0.0)
-            rows = closure.rows(ahead)
-            self.effort += len(rows.names)
-            new = np.linalg.norm(rows.gap / length, axis=1)
-            taken = running & (new < norm)
-            damping = np.where(taken, damping / 10.0, damping * 10.0)
-            stalled = (norm < 1e-12) & ~(new < 0.5 * norm)
-            u = np.where(taken[:, None], ahead, u)
-            gap = np.where(taken[:, None], rows.gap / length, gap)
-            slope = np.where(taken[:, None, None], rows.slope / length[:, None], slope)
-            norm = np.where(taken, new, norm)
-            running &= (norm > 1e-15) & ~stalled & (damping * norm < 1e6)
-            if iteration % _PATIENCE == _PATIENCE - 1:
-                running &= (norm < _STANDS * before) | (norm < ROUNDING)
-                before = norm
-        return u, np.max(np.abs(gap), axis=1)
+            return np.asarray(-np.einsum("lki,lk->li", each, multiplier))
+
+        found = levenberg_marquardt(evaluate, solve, u, gain=GAIN, close=1e-15, round_off=1e-12, most=most)
+        return found.points, np.max(np.abs(found.residuals), axis=1)
 
     def _in_order(self) -> Placed:
         """Keep statements one after the other; firm ones must all be met, up to the rounding of their digits."""

@@ -157,7 +157,7 @@ class _Bend(NamedTuple):
             value = self.value(v + z @ free)
             slope = np.stack([(self.value(v + (z + h * e) @ free) - self.value(v + (z - h * e) @ free)) / (2 * h)
                               for e in np.eye(len(free))], 1)  # fmt: skip
-            move = np.linalg.lstsq(slope, -value)[0]
+            move = np.asarray(np.linalg.lstsq(slope, -value)[0], dtype=float)
             return move, float(np.max(np.abs(move))) / scale
 
         rng = np.random.default_rng(0)

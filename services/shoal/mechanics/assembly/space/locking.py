@@ -114,7 +114,7 @@ def _closed(gap: Callable[[Array], Array], slope: Callable[[Array], Array], q: A
     """Return coordinates near q that meet all constraints but those that nearly depend on others (Gauss-Newton)."""
 
     def correct(q: Array) -> tuple[Array, float]:
-        move = np.linalg.lstsq(slope(q), -gap(q), MOST)[0]
+        move = np.asarray(np.linalg.lstsq(slope(q), -gap(q), MOST)[0], dtype=float)
         return move, float(np.max(np.abs(move)))
 
     return newton(correct, q, close=LEAST).point
