@@ -24,7 +24,7 @@ from shoal.engines.verification import verified
 from shoal.errors import InputError
 from shoal.identification.methods import get_method
 from shoal.identification.recording.source import FileSource
-from shoal.mechanics.analysis.joint_reactions import told as told_reactions
+from shoal.mechanics.analysis.joint_reactions import to_json as reactions_to_json
 from shoal.scene import Scene
 from shoal.trajectory import Trajectory, plain
 from shoal.wire import packed
@@ -117,7 +117,7 @@ def _computed(bench: Bench, name: str, arguments: dict[str, Any], request: Reque
 def told(found: Any) -> Any:
     """A result as the command line prints it with --json."""
     if isinstance(found, list):
-        return told_reactions(found)
+        return reactions_to_json(found)
     trajectory = getattr(found, "trajectory", None)
     return found.to_json() if trajectory is None else {**trajectory.to_json(), "selection": found.to_json()}
 

@@ -96,7 +96,7 @@ def modes(
 @options.as_json
 def reactions(scene: str, times: list[float], values: Values, verify: bool, as_json: bool) -> None:
     """Forces [N] and torques [N m] in the joints of SCENE while it moves, as they act on the second body."""
-    from shoal.mechanics.analysis.joint_reactions import told
+    from shoal.mechanics.analysis.joint_reactions import to_json
     from shoal.notebook import reactions
     from shoal.scene import load_scene
     from shoal.terminal import screen, tables
@@ -104,6 +104,6 @@ def reactions(scene: str, times: list[float], values: Values, verify: bool, as_j
     wanted = load_scene(scene).with_values(values)
     with screen.working(f"reactions of {wanted.name}"):
         found = reactions(wanted, times, verify=verify)
-    report = told(found)
+    report = to_json(found)
     screen.show(report, as_json, lambda: tables.reactions_table(found))
     check_trusted(report["status"] == "ok", report["message"])

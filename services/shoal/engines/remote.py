@@ -1,4 +1,4 @@
-"""Client of an engine behind a service; its address can stand wherever an engine's name can.
+"""Client of an engine behind a service; its address can stand in place of an engine's name.
 
 Doubles cross as JSON in their shortest form, which gives back every bit; values that are not finite come back as NaN.
 """

@@ -83,7 +83,7 @@ class Examined:
     native: Engine
 
     def careful(self, what: str, make: Callable[[], Iterator[Scene]], times: int = 1) -> tuple[Careful | None, str]:
-        """Return the first run of some scenes, on so many times the unknowns, that can be had and believed.
+        """Return the first run of some scenes that can be made and believed. times: the unknowns of the examined run.
 
         If none can be believed, the last of them; if none can be had, None and why not the first.
         """
@@ -232,7 +232,7 @@ def _round_off(scale: float, *runs: Trajectory) -> float:
 
 
 def _apart(one: Trajectory, other: Trajectory) -> Array:
-    """How far the markers of two runs are apart [m], and in the plane how far they are turned [rad], (2,)."""
+    """Return the distance of the markers of two runs [m], and in the plane of their angles [rad], (2,)."""
     angles = turned(one.angles - other.angles) if len(one.axes) == 2 else np.zeros(1)
     return np.array([one.distance(other), np.max(np.abs(angles), initial=0.0)])
 

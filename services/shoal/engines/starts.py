@@ -12,7 +12,7 @@ from shoal.scene import Scene
 from shoal.scene.initial import ABOUT_Z, UNITS, Quantity
 from shoal.trajectory import Array, Trajectory
 
-_TOLD = 3
+_NAMED = 3
 """So many values are named."""
 
 
@@ -43,12 +43,12 @@ class Elsewhere:
     def __bool__(self) -> bool:
         return self.elsewhere > 0
 
-    def told(self, runs: str = "runs") -> str:
-        """In words, empty if all runs start as stated; runs: what they are called."""
+    def describe(self, runs: str = "runs") -> str:
+        """Return a sentence on these runs, empty if all start as stated; runs: what they are called."""
         if not self:
             return ""
-        more = len(self.values) - _TOLD
-        values = ", ".join(map(str, self.values[:_TOLD])) + (f" and {more} more" if more > 0 else "")
+        more = len(self.values) - _NAMED
+        values = ", ".join(map(str, self.values[:_NAMED])) + (f" and {more} more" if more > 0 else "")
         return f"{self.elsewhere} of {self.runs} {runs} start elsewhere than stated, as the joints demand: {values}"
 
     def to_json(self) -> dict[str, Any]:

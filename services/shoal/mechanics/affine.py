@@ -16,7 +16,7 @@ import numpy as np
 from shoal.mechanics.numerics.tile import Array, Number
 
 ROUND_OFF = 1e-12
-"""Of the coefficients of a unit vector."""
+"""Of the coefficients of a unit vector, and of places in parts of the machine's size: some thousand rounding errors."""
 
 
 def is_zero(value: Number) -> bool:

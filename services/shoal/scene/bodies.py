@@ -150,7 +150,7 @@ class Rod(Record):
         return self
 
     @model_validator(mode="after")
-    def _section_is_told(self) -> Rod:
+    def _section_is_defined(self) -> Rod:
         needs = SECTIONS[self.section].needs
         for field in ("width", "wall", "web", "flange"):
             if (getattr(self, field) is None) == (field in needs):

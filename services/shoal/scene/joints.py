@@ -95,7 +95,7 @@ class Revolute(Resisted):
     axis: Axis = Z
 
     @model_validator(mode="after")
-    def _pin_is_told(self) -> Revolute:
+    def _pin_is_defined(self) -> Revolute:
         if self.mu and self.radius is None:
             raise ValueError("radius is missing; friction by mu acts at the radius of the pin (m)")
         return self

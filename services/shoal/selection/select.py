@@ -156,7 +156,7 @@ def select(
 
 
 class _Task(NamedTuple):
-    """The request, and what is known before a theory is chosen, see `Selection`.
+    """The request and the prior estimates, from which a theory is chosen; see `Selection`.
 
     closed, fewest: see `_open`
     """

@@ -32,7 +32,7 @@ DENSE_LIMIT = 60
 """Unknowns beyond which the sparse linear solver is the faster one."""
 REDUNDANT = 0.9
 """Spectral radius for machines in space whose constraints depend on each other, unless the scene says its own."""
-ROUND_OFF = 32.0 * float(np.finfo(float).eps)
+FORCE_FLOOR = 32.0 * float(np.finfo(float).eps)
 """Of the forces of a machine, over their size; cables and beams of 4 to 16 elements end a step at 1 to 10 eps."""
 MOST = 1e5
 """Most steps that a run takes because of narrow parts of a force law."""
@@ -251,7 +251,7 @@ def _force_tolerance(machine: Machine) -> float:
         forces.append(float(np.max(stiffness)) * extent)
     forces += [load.stiffness * extent for load in scene.loads.values() if isinstance(load, Spring)]
     forces += [load.stiffness * np.pi for load in scene.loads.values() if isinstance(load, TorsionSpring)]
-    return max(float(scene.solver.newton_tolerance), ROUND_OFF * max(forces, default=0.0))
+    return max(float(scene.solver.newton_tolerance), FORCE_FLOOR * max(forces, default=0.0))
 
 
 def _too_far(machine: Machine, record: Record) -> float:

@@ -20,7 +20,7 @@ Kind = Literal["revolute", "prismatic", "spherical", "fixed"]
 
 FREEDOMS: dict[str, int] = {"revolute": 1, "prismatic": 1, "spherical": 3, "fixed": 0}
 """Rates of each kind of joint."""
-ROUND_OFF = 1e-9
+SYMMETRIC = 1e-9
 """How far, relative to the largest moment, an inertia may miss symmetry and the triangle inequality."""
 
 
@@ -34,12 +34,12 @@ def _diagonal(value: Any) -> Any:
 def _physical(value: Matrix3) -> Matrix3:
     matrix = np.array(value)
     size = float(np.max(np.abs(matrix)))
-    if not np.all(np.abs(matrix - matrix.T) <= ROUND_OFF * size):
+    if not np.all(np.abs(matrix - matrix.T) <= SYMMETRIC * size):
         raise ValueError("an inertia is a symmetric matrix, or three principal moments (kg m^2)")
     small, middle, large = np.linalg.eigvalsh(matrix)
     if not small > 0:
         raise ValueError(f"an inertia is positive definite, its smallest principal moment is {small:.3g} kg m^2")
-    if large > (small + middle) * (1 + ROUND_OFF):
+    if large > (small + middle) * (1 + SYMMETRIC):
         raise ValueError(
             f"no body has the principal moments {small:.3g}, {middle:.3g}, {large:.3g} kg m^2: "
             "the largest is at most the sum of the others"

@@ -20,7 +20,7 @@ from shoal.mechanics.analysis.free_bodies import FreeBodies
 from shoal.mechanics.analysis.free_motion import FreeMotion
 from shoal.mechanics.analysis.freedom import Metric
 from shoal.mechanics.analysis.joint_forces import Component, components, displacements, friction, work
-from shoal.mechanics.analysis.singular import SHARE, beside
+from shoal.mechanics.analysis.singular import SHARE, nearby_freedom
 from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
@@ -107,8 +107,8 @@ class Reactions:
         }
 
 
-def told(found: list[Reactions]) -> dict[str, Any]:
-    """Plain data of reactions at some times, with the first status that is not ok."""
+def to_json(found: list[Reactions]) -> dict[str, Any]:
+    """Return plain data of reactions at some times, with the first status that is not ok."""
     worst = next((one for one in found if not one.ok), found[0])
     message = "the bodies are not in balance" if worst.status == "unbalanced" else worst.message
     return {"status": worst.status, "message": message, "reactions": [one.to_json() for one in found]}
@@ -259,7 +259,7 @@ def _sharing(evaluator: Evaluator, q: Array, t: float) -> Array:
     freedom = metric.freedom(evaluator.at(q, t=t).jacobian)
     if freedom.dependent.shape[1] == 0:
         return none
-    near = beside(evaluator, metric, freedom, q, t)
+    near = nearby_freedom(evaluator, metric, freedom, q, t)
     return np.asarray(np.max(np.abs(near.dependent), axis=1, initial=0.0))
 
 

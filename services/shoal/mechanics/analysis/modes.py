@@ -95,7 +95,7 @@ class Mode:
 
     @property
     def kind(self) -> str:
-        """Return oscillating, creeping back, free (nothing pulls back), untold (free or indeterminate), unstable."""
+        """Return the kind of motion; that of a mode whose restoring force round-off hides is indeterminate."""
         if self.eigenvalue.real > 1e-9 * abs(self.eigenvalue):
             return "unstable"
         if not self.eigenvalue:
@@ -152,7 +152,7 @@ class Modes:
     def verdict(self) -> tuple[str, str]:
         """Return the status and why it is not ok.
 
-        The status is ok, unbalanced, moving, unstable, cannot-be-told, coarse-mesh or beyond-theory.
+        Every status but ok has a reason, which names the modes that are concerned.
         """
         kinds = [mode.kind for mode in self.modes]
         coarse = [number for number, error in enumerate(self.mesh_errors, 1) if error > COARSE]

@@ -42,7 +42,7 @@ def section_along(felt: Felt, at: Attachment) -> Section:
     rows = []
     for q, v, a, turns, t in zip(felt.q, felt.v, felt.a, felt.turns, felt.times.tolist(), strict=True):
         felt.evaluator.turns = turns
-        both = _told(sections(felt.evaluator, q, v, a, t, name, bodies=bodies), ends)
+        both = _at_ends(sections(felt.evaluator, q, v, a, t, name, bodies=bodies), ends)
         rows.append((1 - x) * both[:, 0] + x * both[:, 1])
     found = Section(*np.array(rows).T)
     if np.isnan(found.normal).all():
@@ -54,8 +54,8 @@ def section_along(felt: Felt, at: Attachment) -> Section:
     return found
 
 
-def _told(found: Sections | SpatialSections, ends: slice) -> Array:
-    """At both ends of an element, (4, 2)."""
+def _at_ends(found: Sections | SpatialSections, ends: slice) -> Array:
+    """Return normal and shear force, bending and torsional moment at both ends of an element, (4, 2)."""
     if isinstance(found, Sections):
         none = np.zeros(2)
         return np.array([found.normal[ends], found.shear[ends], found.moment[ends], none])

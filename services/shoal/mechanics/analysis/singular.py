@@ -24,8 +24,8 @@ SHARE = 1e-6
 """A constraint whose part in what depends on others (of unit size) is less does not."""
 
 
-def beside(evaluator: Evaluator, metric: Metric, freedom: Freedom, q: Array, t: float) -> Freedom:
-    """The tangent space at a state near q, in which it is `freedom`; q itself where nothing can move."""
+def nearby_freedom(evaluator: Evaluator, metric: Metric, freedom: Freedom, q: Array, t: float) -> Freedom:
+    """Return the tangent space at a state near q that satisfies the constraints; `freedom`, at q, if that is zero."""
     if not freedom.basis.shape[1]:
         return freedom
     # A fixed combination of all free directions, long enough to leave a singular position.
@@ -48,7 +48,7 @@ def crossing(evaluator: Evaluator, metric: Metric, freedom: Freedom, q: Array, t
     """The constraints that depend on others at q and not beside it, by name; none where q is not singular."""
     if not freedom.dependent.shape[1]:
         return ()
-    near = beside(evaluator, metric, freedom, q, t)
+    near = nearby_freedom(evaluator, metric, freedom, q, t)
     if near.dependent.shape[1] >= freedom.dependent.shape[1]:
         return ()
     parts = np.max(np.abs(freedom.dependent), axis=1)

@@ -5,7 +5,7 @@ Nielsen and Tingleff, Methods for non-linear least squares problems, 2004.
 
 A search ends where its residual is round-off, or where its linear model promises to lower the sum of squares by no
 more than a given part. Unlike the length of a step or a limit of the damping this does not depend on units, and it
-holds at every minimum, whatever its residual. It ends a search that no step leads down as well, as rejected steps are
+holds at a minimum of any residual. It ends a search that no step leads down as well, as rejected steps are
 damped until they promise nothing.
 """
 
@@ -30,15 +30,14 @@ Solve = Callable[[Array, Array, Array, Index], Array]
 
 
 class Minima(NamedTuple):
-    """Ends of all searches: points (searches, unknowns), residuals (searches, rows), steps that were tried (searches,).
+    """Ends of all searches: points (searches, unknowns), residuals (searches, rows), and their norms (searches,).
 
-    norms: of the residuals, (searches,), not finite where a search could not begin
+    Those of a search that could not begin are not finite.
     """
 
     points: Array
     residuals: Array
     norms: Array
-    iterations: Index
 
 
 def levenberg_marquardt(
@@ -60,7 +59,7 @@ def levenberg_marquardt(
     """
     points, every = points.copy(), np.arange(len(points))
     residuals, jacobians = evaluate(points, every)
-    norms, damping, iterations = np.linalg.norm(residuals, axis=1), np.full(len(points), DAMPING), np.zeros_like(every)
+    norms, damping = np.linalg.norm(residuals, axis=1), np.full(len(points), DAMPING)
     active = every[np.isfinite(norms) & (norms > close)]
     for _ in range(most):
         residual, jacobian = residuals[active], jacobians[active]
@@ -73,10 +72,10 @@ def levenberg_marquardt(
         trial = project(points[active] + step)
         residual, jacobian = evaluate(trial, active)
         norm, before = np.linalg.norm(residual, axis=1), norms[active]
-        better, iterations[active] = norm < before, iterations[active] + 1
+        better = norm < before
         damping[active] *= np.where(better, 0.1, 10.0)
         taken = active[better]
         points[taken], residuals[taken], jacobians[taken] = trial[better], residual[better], jacobian[better]
         norms[taken] = norm[better]
         active = active[(norms[active] > close) & ((before >= round_off) | (norm < HALVED * before))]
-    return Minima(points, residuals, norms, iterations)
+    return Minima(points, residuals, norms)

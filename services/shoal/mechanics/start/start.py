@@ -32,7 +32,7 @@ _EFFORT = 8_000
 """Gaps (`Assembly.effort`) after which no fewer statements are sought that contradict each other."""
 _SLACK = 1e-3
 """Part of the largest pull on a statement below which one is not pulled."""
-ROUND_OFF = 1e-9
+UNCHANGED = 1e-9
 """Changes below this, relative to the value, 1 rad, the size or the speed of the machine, are not spoken of."""
 
 
@@ -221,7 +221,7 @@ def _rates_refused(velocities: Velocities, broken: list[Statement]) -> InputErro
     names = dict.fromkeys((*velocities.walk.closing, *velocities.rows.names))
     joint = next((name for name in names if last not in velocities.run(joint=name).broken), "")
     told = velocities.run(without=last).rates[0, last.columns]
-    told = np.where(np.abs(told) > ROUND_OFF * velocities.speed, told, 0.0)
+    told = np.where(np.abs(told) > UNCHANGED * velocities.speed, told, 0.0)
     wants = f"joint {joint} asks for {_written(told)} {UNITS[last.quantity]}" if joint else "they cannot both hold"
     return _contradiction([*guilty, last], wants)
 
@@ -321,7 +321,7 @@ def changes(scene: Scene, used: Mapping[str, InitialState], size: Number, lanes:
             if now is None:
                 continue
             off = np.max(np.abs(now[: len(stated)] - stated[: len(now)]), axis=0)
-            small = ROUND_OFF * np.maximum(np.max(np.abs(stated), axis=0), least.get(quantity, 1.0))
+            small = UNCHANGED * np.maximum(np.max(np.abs(stated), axis=0), least.get(quantity, 1.0))
             about_z = np.broadcast_to(told == quantity or np.all(np.abs(now[:2]) <= small, axis=0), lanes)
             for lane in np.flatnonzero(off > small):
                 name_told = quantity if about_z[lane] else told

@@ -2,7 +2,7 @@
 
 Axes that are to be parallel and differ in the sixth digit leave a linkage no freedom. What holds it is a row of the
 constraints that nearly depends on others. It does so near a singular position as well; but there the dependence ends a
-short way on, while a rounded machine keeps it wherever it would go. A short lever keeps it as well: it is one where the
+short way on, while a rounded machine keeps it in all positions. A short lever keeps it as well: it is one where the
 dependence is large for the digits of the numbers.
 """
 
