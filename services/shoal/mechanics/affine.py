@@ -1,8 +1,8 @@
 """Points and directions of bodies as affine functions of the coordinates.
 
-A coordinate is a real unknown, its coefficient a vector of R^d. What joints share is eliminated by substituting such
-expressions: a point shared by two bodies, a direction kept by a weld, a place on a fixed line (one unknown). No
-multiplier, no drift.
+A coordinate is a real unknown, its coefficient a vector of R^d. Constraints that are linear in them are eliminated by
+substitution: a point shared by two bodies, a direction kept by a weld, a place on a fixed line (one unknown). They
+need no multiplier and have no drift.
 """
 
 from __future__ import annotations
@@ -84,17 +84,17 @@ class Affine:
 
 
 def mapped(matrix: Array, u: Array) -> Array:
-    """A matrix (d, d, lanes) times a vector (d, lanes)."""
+    """Return the product of a matrix (d, d, lanes) and a vector (d, lanes)."""
     return np.stack([sum(entry * part for entry, part in zip(row, u, strict=True)) for row in matrix])
 
 
 def fixed(value: Array) -> Affine:
-    """A vector that does not move, (d, lanes)."""
+    """Return a constant vector, (d, lanes)."""
     return Affine({}, value)
 
 
 def combined(vectors: tuple[Affine, ...], factors: tuple[Number, ...]) -> Affine:
-    """The sum of vectors times numbers; those times zero are left out, so that their unknowns are."""
+    """Return a linear combination of vectors, without the unknowns of those whose factor is zero."""
     total = fixed(0.0 * vectors[0].constant)
     for one, factor in zip(vectors, factors, strict=True):
         if np.any(factor):

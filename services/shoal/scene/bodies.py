@@ -1,4 +1,4 @@
-"""Bodies: a rod, whose element decides how much of it is modelled, and those of `solids`."""
+"""Bodies of a scene: rods, whose element chooses the beam theory and the discretisation, and those of `solids`."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ _ONLY_FLEXIBLE = {
     "ends": None,
     "retardation": 0.0,
 }
-"""Fields that a rigid rod has no use for, and what they are where nobody states them."""
+"""Fields of flexible rods alone, with their default values."""
 
 
 @cache

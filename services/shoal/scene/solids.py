@@ -1,4 +1,4 @@
-"""Bodies that are no rods: rigid ones of any shape, flexible ones by given modes, and point masses."""
+"""Bodies other than rods: rigid bodies, modal bodies (floating frame of reference formulation), point masses."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def _formed(given: Any) -> Any:
 Principal = tuple[NonNegative, NonNegative, NonNegative]
 Matrix = tuple[Vector3, Vector3, Vector3]
 if TYPE_CHECKING:
-    Inertia = Any  # who computes in the plane has one number, or one a lane
+    Inertia = Any  # in the plane one number, or one a lane
 else:
     Inertia = Annotated[NonNegative | Principal | Matrix, BeforeValidator(_formed)]
 
@@ -96,7 +96,7 @@ class ModalBody(Record):
 
     mass [kg], inertia about the centre of mass [kg m^2], centre_of_mass and named_points [m] are those of the body
     without deformation. modal_mass: integrals of u_i u_j + v_i v_j [kg]; modal_stiffness [N/m]; modal_damping [N s/m];
-    modal_coupling: integrals of u_i v_j - v_i u_j [kg], by which modes feel each other in a frame that turns.
+    modal_coupling: integrals of u_i v_j - v_i u_j [kg], the gyroscopic coupling of modes in a rotating frame.
     """
 
     kind: Literal["modal-body"] = "modal-body"

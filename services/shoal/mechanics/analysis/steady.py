@@ -386,7 +386,7 @@ def _checked(
     weights = _constant(twists, begun, seen, weights, idle)
     found = _steady(begun.scene, begun.evaluator, begun.metric, twists, weights, begun.q, begun.t)
     if seek:
-        sought = _sought(found, twists, size)
+        sought = _near_start(found, twists, size)
         if sought is None:
             raise _refused(begun, twists, v, size)
         found = sought
@@ -497,7 +497,7 @@ def _state(steady: Steady, s: float) -> tuple[Array, Array, Array, float]:
     return q, v, steady.matrix @ v, steady.t + s
 
 
-def _sought(begun: Steady, twists: Twists, size: float) -> Steady | None:
+def _near_start(begun: Steady, twists: Twists, size: float) -> Steady | None:
     """The steady motion of the same field near the start, by Newton's method; None where there is none."""
     mass = sum(float(body.mass) for body in begun.scene.bodies.values())
     unit = size * np.sqrt(mass)

@@ -1,4 +1,4 @@
-"""Joints in space inside Exudyn, condition by condition: what each locks, and how far it opens."""
+"""Joints in space as items of Exudyn: for each condition the items that impose it, and its residual along a motion."""
 
 from __future__ import annotations
 
@@ -22,12 +22,13 @@ from shoal.scene import JOINT_KINDS, Attachment, Joint, Revolute, Slider
 from shoal.trajectory import Array
 
 Gap = Callable[[Array, Array], Array]
+"""Residual of a condition [m or rad] at coordinates and rates (rows, unknowns), (rows,)."""
 
 SPATIAL_JOINTS = frozenset(JOINT_KINDS) - {"coupling"}
 
 
 def add_joint(exu: Any, ends: SpatialEnds, name: str, joint: Joint) -> list[Gap]:
-    """Enter a joint without its friction; how far each of its conditions is open. Raises InputError."""
+    """Add a joint without its friction; return the residuals of its conditions. Raises InputError."""
     ends.system.enter(f"joints.{name}")
     return [CONDITIONS[type(one)](exu, ends, f"joints.{name}", one) for one in conditions(joint, 3)]
 
