@@ -29,7 +29,7 @@ from shoal.response.read import by_name
 from shoal.scene.load import as_scene
 from shoal.scene.paths import unwrapped
 from shoal.shelf import NAME
-from shoal.table import Table, load_table
+from shoal.table import ColumnTable, load_table
 from shoal.trajectory import Array
 from shoal.wire import KIND, unpacked
 
@@ -249,7 +249,7 @@ def _recording(source: FileSource, given: Any, channels: tuple[Channel, ...] | N
     return {**stated, "kind": "file"}, {"columns": columns}
 
 
-def _numbers(table: Table) -> dict[str, Array]:
+def _numbers(table: ColumnTable) -> dict[str, Array]:
     """The columns that hold numbers; a problem that needs another is refused by the service."""
     found = {}
     for name in table.frame.columns:

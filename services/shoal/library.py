@@ -27,7 +27,7 @@ from shoal.scene.load import LARGEST, built_in_scenes, read_yaml, some, unknown
 from shoal.scene.measured import PARTS
 from shoal.scene.parametric import parametric
 from shoal.shelf import LARGEST as LARGEST_ENTRY
-from shoal.shelf import NAME, Entry, Files, check_name, check_paths, located, shelf
+from shoal.shelf import NAME, Files, StoredVersion, check_name, check_paths, located, shelf
 from shoal.table import load_table
 
 if TYPE_CHECKING:
@@ -139,12 +139,12 @@ def kind_of(given: str) -> Kind:
     raise InputError(f"kind: no kind {given!r}; there are {', '.join(kind.one for kind in KINDS.values())}")
 
 
-def entries(kind: str | None = None) -> list[Entry]:
+def entries(kind: str | None = None) -> list[StoredVersion]:
     """Everything in the library, or what is of a kind."""
     return [entry for folder in KINDS if kind in (None, folder) for entry in shelf().entries(folder)]
 
 
-def entry(name: str, kind: str | None = None) -> Entry:
+def entry(name: str, kind: str | None = None) -> StoredVersion:
     """The entry of that NAME or NAME@VERSION. Raises InputError."""
     found = [one for folder in KINDS if kind in (None, folder) and (one := shelf().find(folder, name)) is not None]
     if not found:
@@ -157,7 +157,7 @@ def entry(name: str, kind: str | None = None) -> Entry:
     return found[0]
 
 
-def about(entry: Entry) -> dict[str, Any]:
+def about(entry: StoredVersion) -> dict[str, Any]:
     """Return the summary of an entry for lists and services."""
     try:
         data = read_yaml(_text(_content(entry.document, LARGEST), entry.document), entry.name)
@@ -167,7 +167,7 @@ def about(entry: Entry) -> dict[str, Any]:
     return {"kind": entry.kind, "name": entry.name, "version": entry.version, "description": description}
 
 
-def add(file: str | Path, name: str | None = None, kind: str | None = None) -> Entry:
+def add(file: str | Path, name: str | None = None, kind: str | None = None) -> StoredVersion:
     """Check a scene, a problem or a recording (YAML, CSV or Parquet) and keep it with the files that it names.
 
     name: else that of the file; kind: else what its fields say. Raises InputError.
@@ -178,7 +178,7 @@ def add(file: str | Path, name: str | None = None, kind: str | None = None) -> E
     return put(wanted, name, gathered(wanted, str(path), name, whole=False))
 
 
-def put(kind: str, name: str, files: Files) -> Entry:
+def put(kind: str, name: str, files: Files) -> StoredVersion:
     """Keep files under a name if they are right; see `Shelf.put`. Raises InputError."""
     if KINDS[kind].built_in(check_name(name)):
         raise InputError(f"name: {name} is the name of a built-in {KINDS[kind].one}; choose another")

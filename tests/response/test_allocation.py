@@ -19,7 +19,7 @@ from shoal.response.allocation import Allocation, cheapest, with_factors
 from shoal.response.allocation_of_random import Confirmed, Cut
 from shoal.response.allocation_of_random import cheapest as within
 from shoal.response.inputs import Inputs, Parameter
-from shoal.response.limits.estimate import Estimate
+from shoal.response.limits.estimate import ExceedanceEstimate
 from shoal.response.marginals import Frozen, Interval, Normal, Scaled, Uniform
 from shoal.response.worst import worst
 from shoal.scene import Scene, load_scene
@@ -301,7 +301,7 @@ def test_a_probability_of_nothing_is_not_near_the_target() -> None:
     """Few runs that none passes leave room for the target, and say nothing of how wide tolerances may be."""
 
     def confirmed(chance: float, unseen: float) -> Confirmed:
-        return Confirmed(np.ones(1), Estimate(np.array([chance]), np.array([0.02]), "", unseen), "")
+        return Confirmed(np.ones(1), ExceedanceEstimate(np.array([chance]), np.array([0.02]), "", unseen), "")
 
     assert confirmed(9.8e-3, 0.0).near(1e-2)
     assert not confirmed(1.01e-2, 0.0).near(1e-2)

@@ -11,7 +11,7 @@ from shoal.response import uncertain
 from shoal.response.limits import limit
 from shoal.response.limits.counted import contradiction
 from shoal.response.limits.crosschecked import shifts
-from shoal.response.limits.estimate import Estimate
+from shoal.response.limits.estimate import ExceedanceEstimate
 from shoal.scene import Scene
 from sliding import puck
 
@@ -27,8 +27,8 @@ def test_a_refused_study_keeps_no_limit() -> None:
     assert found.limits[0].kept is not True
 
 
-def estimate(probability: float, deviation: float) -> Estimate:
-    return Estimate(np.array([probability]), np.array([deviation]), "importance sampling")
+def estimate(probability: float, deviation: float) -> ExceedanceEstimate:
+    return ExceedanceEstimate(np.array([probability]), np.array([deviation]), "importance sampling")
 
 
 @pytest.mark.parametrize(

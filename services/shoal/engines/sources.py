@@ -122,7 +122,7 @@ class Examined:
 
 
 @dataclass(frozen=True)
-class Source:
+class ErrorSource:
     """A source of error. concerns: whether a scene has it.
 
     look: estimates it by differences of runs, which add up; None, and the note says why, where it cannot
@@ -238,10 +238,10 @@ def _apart(one: Trajectory, other: Trajectory) -> Array:
 
 
 SOURCES = (
-    Source("time", lambda scene: True, in_time),
-    Source("mesh", lambda scene: any(scene.flexible_rods), of_mesh),
-    Source("theory", lambda scene: True, of_theory),
-    Source("friction", lambda scene: bool(_rubbing(scene)), of_friction),
-    Source("bending", lambda scene: bool(_modal(scene)), of_bending),
+    ErrorSource("time", lambda scene: True, in_time),
+    ErrorSource("mesh", lambda scene: any(scene.flexible_rods), of_mesh),
+    ErrorSource("theory", lambda scene: True, of_theory),
+    ErrorSource("friction", lambda scene: bool(_rubbing(scene)), of_friction),
+    ErrorSource("bending", lambda scene: bool(_modal(scene)), of_bending),
 )
 """Of errors at the markers. The time step comes first: a run that it rejects is not looked at further."""

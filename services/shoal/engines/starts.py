@@ -17,7 +17,7 @@ _NAMED = 3
 
 
 @dataclass(frozen=True)
-class Value:
+class ChangedValue:
     """A stated value of the start that runs do not keep.
 
     runs: how many; by: how far what they use is away at most, in `unit`
@@ -38,7 +38,7 @@ class Elsewhere:
 
     runs: int
     elsewhere: int
-    values: tuple[Value, ...]
+    values: tuple[ChangedValue, ...]
 
     def __bool__(self) -> bool:
         return self.elsewhere > 0
@@ -90,7 +90,7 @@ class Stated:
         """Summarise the distances from each value, (runs, values)."""
         count, most = (away > 0).sum(axis=0), away.max(axis=0, initial=0.0)
         values = tuple(
-            Value(f"initial.{body}.{quantity}", int(number), float(by), UNITS[quantity])
+            ChangedValue(f"initial.{body}.{quantity}", int(number), float(by), UNITS[quantity])
             for (body, quantity), number, by in zip(self.values, count, most, strict=True)
             if number
         )

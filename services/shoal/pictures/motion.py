@@ -11,7 +11,7 @@ import numpy as np
 from shoal.engines.contract import Engine
 from shoal.errors import ComputationError, InputError
 from shoal.pictures.outline import ground, outlined
-from shoal.pictures.solids import Bar, Solids
+from shoal.pictures.solids import Bar, MarkedScene
 from shoal.pictures.views import View, views
 from shoal.scene import Scene
 from shoal.trajectory import Array, plain
@@ -124,7 +124,7 @@ def traced_out(scene: Scene) -> tuple[Scene, Callable[[Callable[[str], Array]], 
     Places of a marker by its name: [m], (frames, d).
     """
     traced, points = outlined(scene)
-    solids = Solids(traced, points, scene) if scene.dimensions == 3 else None
+    solids = MarkedScene(traced, points, scene) if scene.dimensions == 3 else None
 
     def read(at: Callable[[str], Array]) -> dict[str, Any]:
         outlines = {body: np.stack([at(name) for name in names], axis=1) for body, names in points.items()}

@@ -60,7 +60,7 @@ class Reference:
     base: dict[str, Level]
 
 
-class Runs:
+class LevelRuns:
     """Runs of one scene on different levels, each made once.
 
     limits: the open rods with the element whose limit is their truth; fewest: see `run.fewest`; coarsest: the first
@@ -139,7 +139,7 @@ class Runs:
 
 
 def refine(
-    runs: Runs, rods: tuple[str, ...], fixed: Levels, tolerance: float, impatient: bool = False
+    runs: LevelRuns, rods: tuple[str, ...], fixed: Levels, tolerance: float, impatient: bool = False
 ) -> Reference | str:
     """Refine the rods until two meshes agree; else return the reason why none do.
 
@@ -176,7 +176,7 @@ def refine(
     return fine
 
 
-def _refinement(runs: Runs, levels: Levels) -> Candidate | str:
+def _refinement(runs: LevelRuns, levels: Levels) -> Candidate | str:
     """Run these levels by half the stable step; else return that it would take too much work."""
     work = runs.forecast.work(levels) * STEP_MARGIN / HALF
     if (seconds := work / PACE) <= runs.patience:
@@ -189,7 +189,7 @@ def _refinement(runs: Runs, levels: Levels) -> Candidate | str:
 
 
 def _next(
-    runs: Runs,
+    runs: LevelRuns,
     fine: Candidate,
     count: dict[str, int],
     base: dict[str, int],

@@ -18,8 +18,8 @@ from shoal.errors import ComputationError, InputError
 from shoal.scene import Rod, Scene
 from shoal.selection.coarsen import WITHIN, coarsen
 from shoal.selection.levels import RIGID, SHEARS, SLENDER, STOUT, Levels, apply, open_rods
-from shoal.selection.prior import Prior, estimate
-from shoal.selection.refine import AGREE, PATIENCE, REFERENCE, Progress, Reference, Runs, refine, settled
+from shoal.selection.prior import PriorEstimate, estimate
+from shoal.selection.refine import AGREE, PATIENCE, REFERENCE, LevelRuns, Progress, Reference, refine, settled
 from shoal.selection.run import Candidate, distance, fewest, rigid_scene, run
 from shoal.selection.strain_limits import excessive_torques
 from shoal.trajectory import Array, Status, Trajectory, plain
@@ -55,7 +55,7 @@ class Selection:
     chosen: Candidate
     trajectory: Trajectory
     candidates: list[Candidate]
-    priors: dict[str, Prior]
+    priors: dict[str, PriorEstimate]
     rigid: dict[str, str]
     limits: dict[str, str]
     shear: float
@@ -164,7 +164,7 @@ class _Task(NamedTuple):
     scene: Scene
     tolerance: float
     asked: Array
-    priors: dict[str, Prior]
+    priors: dict[str, PriorEstimate]
     closed: dict[str, str]
     progress: Progress
     patience: float
@@ -210,7 +210,7 @@ def _of_theory(task: _Task, limits: Mapping[str, str], another: bool = False, st
     unmoved = [rod for rod, prior in priors.items() if prior.error * SURELY_RIGID * len(limits) < tolerance]
     surely = [rod for rod in unmoved if rod not in task.meshed]
     closed = task.closed | {rod: f"would move the markers by about {priors[rod].error:.1g} m" for rod in surely}
-    runs = Runs(task.scene, grid, limits, task.progress, task.patience, task.meshed, task.fewest)
+    runs = LevelRuns(task.scene, grid, limits, task.progress, task.patience, task.meshed, task.fewest)
     fixed = {
         rod: replace(level, rotary=level.rotary or (stout and level == RIGID)) for rod, level in runs.coarsest.items()
     }
@@ -288,7 +288,7 @@ def _open(scene: Scene) -> tuple[dict[str, str], dict[str, str], dict[str, int]]
     return {rod: limit for rod, limit in limits.items() if rod not in closed}, closed, counts
 
 
-def _rigid(runs: Runs, levels: Levels, tolerance: float, known: float) -> tuple[Candidate, str]:
+def _rigid(runs: LevelRuns, levels: Levels, tolerance: float, known: float) -> tuple[Candidate, str]:
     """Return the run with the coarsest tolerance of an adaptive integrator that the next tolerance confirms."""
     last: Candidate | None = None
     for step_tolerance in TOLERANCES:
@@ -312,7 +312,7 @@ def _rigid(runs: Runs, levels: Levels, tolerance: float, known: float) -> tuple[
 
 
 def _flexible(
-    runs: Runs,
+    runs: LevelRuns,
     rods: tuple[str, ...],
     fixed: Levels,
     task: _Task,

@@ -16,7 +16,7 @@ from shoal.engines.exudyn.build import PARTS, Beam, Machine, build, library, sil
 from shoal.engines.exudyn.checks import judge
 from shoal.engines.exudyn.joints import JOINTS
 from shoal.engines.exudyn.loads import LOADS
-from shoal.engines.exudyn.record import Record, Steps, choose_steps
+from shoal.engines.exudyn.record import KeptStates, Steps, choose_steps
 from shoal.engines.exudyn.space.build import build_in_space
 from shoal.engines.exudyn.space.joints import SPATIAL_JOINTS
 from shoal.engines.interrupts import interruptible
@@ -113,7 +113,7 @@ class ExudynEngine(OneByOne):
         end = float(wanted[-1])
         machine = self.machine(exu, scene, end)
         steps = choose_steps(wanted, scene.solver.step, machine.unknowns, machine.clock.halts)
-        record = Record(steps, machine.reference)
+        record = KeptStates(steps, machine.reference)
         failure = self._run(exu, machine, record)
         if (much := _too_far(machine, record)) > 1.0:
             # As the native solver does, but with all steps.
@@ -146,7 +146,7 @@ class ExudynEngine(OneByOne):
             return build_in_space(exu, scene, self.beam, end, system_of)
         return build(exu, scene, self.beam, end, system_of)
 
-    def _run(self, exu: Any, machine: Machine, record: Record) -> str:
+    def _run(self, exu: Any, machine: Machine, record: KeptStates) -> str:
         """Integrate, filling the record. Returns why it ended early, or nothing."""
         if record.steps.count == 0:
             record.take(machine.mbs, 0.0)
@@ -254,7 +254,7 @@ def _force_tolerance(machine: Machine) -> float:
     return max(float(scene.solver.newton_tolerance), FORCE_FLOOR * max(forces, default=0.0))
 
 
-def _too_far(machine: Machine, record: Record) -> float:
+def _too_far(machine: Machine, record: KeptStates) -> float:
     """Return by which factor the steps are too long for narrow parts of force laws."""
     kept = record.steps.kept
     one_step = (np.diff(kept) == 1) & np.isfinite(record.q[1:]).all(axis=1)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from shoal.engines.tree.description import SpatialChain
-from shoal.engines.tree.march import MAXIMAL_STEPS, Marched, march
+from shoal.engines.tree.march import MAXIMAL_STEPS, TreeRun, march
 from shoal.engines.tree.tableau import DOPRI853, RK4
 from shoal.engines.tree.tree import Array, ChainModel, build, room
 from shoal.errors import InputError
@@ -142,13 +142,13 @@ def _checked(times: Sequence[float] | Array, step: float | None, tolerance: floa
     return wanted
 
 
-def _points(model: ChainModel, record: Marched) -> Array:
+def _points(model: ChainModel, record: TreeRun) -> Array:
     turns = record.rotation[:, model.point_bodies].reshape(-1, len(model.points), 3, 3)
     points: Array = record.position[:, model.point_bodies] + np.einsum("snij,nj->sni", turns, model.point_places)
     return points
 
 
-def _relative(model: ChainModel, record: Marched) -> float:
+def _relative(model: ChainModel, record: TreeRun) -> float:
     """Energy error over the largest kinetic energy or change of potential energy; round-off sets the scale at rest."""
     tree = model.tree
     reach = float(np.sum(np.linalg.norm(tree.offset, axis=1) + np.linalg.norm(tree.lever, axis=1)))
@@ -156,7 +156,7 @@ def _relative(model: ChainModel, record: Marched) -> float:
     return float(record.facts[0] / np.maximum(record.facts[1], floor))
 
 
-def _verdict(record: Marched, times: Array, drift: float, allowed: float) -> tuple[Status, str]:
+def _verdict(record: TreeRun, times: Array, drift: float, allowed: float) -> tuple[Status, str]:
     error, _, steps, _, reached = record.facts
     if not np.isfinite(error):
         return Status.DIVERGED, f"the motion is not finite after {reached:.6g} s; use a smaller step"

@@ -189,7 +189,7 @@ def best_apart(model: ForwardModel, points: Array, values: Array, count: int) ->
     return np.array(found[:count] or [points[0]])
 
 
-class Course(list[tuple[int, float, float]]):
+class SearchHistory(list[tuple[int, float, float]]):
     """Rows of (iteration, best, mean fitness), one for each population of a search; `progress` is told of each."""
 
     def __init__(self, progress: Progress) -> None:

@@ -18,7 +18,7 @@ import scipy.sparse
 
 from shoal.mechanics.analysis.evaluate import Evaluation, Evaluator
 from shoal.mechanics.analysis.freedom import Freedom, Metric
-from shoal.mechanics.analysis.small_motions import ROUND, Spectrum, Tangent, parts_of, spectrum
+from shoal.mechanics.analysis.small_motions import ROUND, BoundedMatrix, Spectrum, parts_of, spectrum
 from shoal.mechanics.numerics.newton import Root, newton
 from shoal.mechanics.numerics.tile import Array
 
@@ -104,25 +104,25 @@ class Balance:
         basis = view.freedom.basis
         return np.asarray(basis.T @ (full @ basis))
 
-    def tangent(self, q: Array, view: View, load: float = 1.0) -> Tangent:
+    def tangent(self, q: Array, view: View, load: float = 1.0) -> BoundedMatrix:
         """The stiffness K + sum lambda_k C_k,qq in all coordinates."""
         loose = self.evaluator.stiffness(q, self.t, load=load)
         full = self.evaluator.stiffness(q, self.t, multipliers=view.multipliers, load=load)
-        return Tangent(full, ROUND * (abs(loose) + abs(full - loose)))
+        return BoundedMatrix(full, ROUND * (abs(loose) + abs(full - loose)))
 
-    def at_rest(self, q: Array, view: View) -> Tangent:
+    def at_rest(self, q: Array, view: View) -> BoundedMatrix:
         """Return the tangent at an equilibrium, where the remaining forces are round-off."""
         found, evaluation = self.tangent(q, view), view.evaluation
         if self.residual(view) > BALANCED:
             return found
         left = np.abs(evaluation.force - evaluation.jacobian.T @ view.multipliers) / self.size
-        return Tangent(found.matrix, found.bound + OFF * scipy.sparse.diags_array(left))
+        return BoundedMatrix(found.matrix, found.bound + OFF * scipy.sparse.diags_array(left))
 
     def spectrum(self, q: Array, view: View, load: float = 1.0) -> Spectrum:
         """The squared frequencies of small motions, where the loads have a potential."""
         return self.spectrum_of(self.tangent(q, view, load), view)
 
-    def spectrum_of(self, stiffness: Tangent, view: View) -> Spectrum:
+    def spectrum_of(self, stiffness: BoundedMatrix, view: View) -> Spectrum:
         """Return the spectrum of a symmetric stiffness."""
         parts = parts_of(self.evaluator.mass, view.evaluation.jacobian)
         return spectrum(stiffness, view.freedom.basis, self.evaluator.mass, parts)

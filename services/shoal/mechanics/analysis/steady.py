@@ -27,7 +27,7 @@ from shoal.mechanics import rotation as turns
 from shoal.mechanics.analysis.balance import BALANCED, CLOSE, STALLED, STRAINED
 from shoal.mechanics.analysis.evaluate import Evaluator, points
 from shoal.mechanics.analysis.freedom import Freedom, Metric
-from shoal.mechanics.analysis.small_motions import ROUND, Tangent
+from shoal.mechanics.analysis.small_motions import ROUND, BoundedMatrix
 from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.frames import BeamFrame, ModalFrame, RigidFrame
 from shoal.mechanics.numerics.newton import newton
@@ -219,7 +219,7 @@ class Steady:
         multipliers = freedom.multipliers(force)
         loose = self.evaluator.stiffness(q, t)
         full = self.evaluator.stiffness(q, t, multipliers=multipliers)
-        stiffness = Tangent(full.toarray(), (ROUND * (abs(loose) + abs(full - loose))).toarray())
+        stiffness = BoundedMatrix(full.toarray(), (ROUND * (abs(loose) + abs(full - loose))).toarray())
         damping = self.evaluator.damping(q, v).toarray()
         return Seen(
             evaluation.jacobian.toarray(), freedom, freedom.basis.T @ force, evaluation.gap, stiffness, damping,
@@ -240,18 +240,18 @@ class Steady:
         turned = moved[:n, :n]
         return turned, turned @ self.q + moved[:n, n], turned @ self.v
 
-    def stiffness(self, seen: Seen) -> Tangent:
+    def stiffness(self, seen: Seen) -> BoundedMatrix:
         """Stiffness of small motions in the moving frame, with the centrifugal one and that of forces of rates."""
         inertial = self.evaluator.mass @ self.matrix @ self.matrix
         friction = self._by_rates(seen)
         matrix = seen.stiffness.matrix + inertial - friction
         bound = seen.stiffness.bound + EXACT * (abs(inertial) + abs(friction))
-        return Tangent(np.asarray(matrix), np.asarray(bound))
+        return BoundedMatrix(np.asarray(matrix), np.asarray(bound))
 
-    def gyroscopic(self, seen: Seen) -> Tangent:
+    def gyroscopic(self, seen: Seen) -> BoundedMatrix:
         """Damping and gyroscopic matrix of small motions in the moving frame."""
         coriolis = 2.0 * (self.evaluator.mass @ self.matrix)
-        return Tangent(seen.damping + coriolis, ROUND * abs(seen.damping) + EXACT * abs(coriolis))
+        return BoundedMatrix(seen.damping + coriolis, ROUND * abs(seen.damping) + EXACT * abs(coriolis))
 
     def _by_rates(self, seen: Seen) -> Array:
         """Derivative along the free directions of the forces that the rates X(q) make."""
@@ -277,7 +277,7 @@ class Seen(NamedTuple):
     freedom: Freedom
     unbalanced: Array
     gap: Array
-    stiffness: Tangent
+    stiffness: BoundedMatrix
     damping: Array
     size: float
 

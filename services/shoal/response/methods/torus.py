@@ -38,7 +38,7 @@ SETTLED = 1e-10
 
 
 @dataclass(frozen=True)
-class Spectrum:
+class LineSpectrum:
     """One run. frequencies [rad/s], (base,); coefficients: of cosines, then sines, (2 K, signals)"""
 
     frequencies: Array
@@ -119,7 +119,7 @@ class Torus:
             )
         self.known = best.frequencies
 
-    def of(self, course: Array) -> Spectrum:
+    def of(self, course: Array) -> LineSpectrum:
         """The lines of one run. Raises UnsuitableError where they do not tell it."""
         assert self.known is not None
         lines = _lines(self.watch.times, course / self._range, 2 * LINES)
@@ -131,7 +131,7 @@ class Torus:
             )
         return found
 
-    def surrogate(self, study: Study, germs: Array, runs: list[Spectrum], terms: Terms) -> Wound:
+    def surrogate(self, study: Study, germs: Array, runs: list[LineSpectrum], terms: Terms) -> Wound:
         """See `LongTime`."""
         told = np.stack([np.concatenate([run.frequencies, run.coefficients.ravel()]) for run in runs])
         found = fit(study.inputs, germs, told, terms).coefficients
@@ -139,7 +139,7 @@ class Torus:
         waves = found[:, base:].reshape(len(terms), *runs[0].coefficients.shape)
         return Wound(study.inputs, terms, found[:, :base], waves, self.orders, study.when)
 
-    def _fitted(self, course: Array, frequencies: Array, orders: IntArray) -> Spectrum:
+    def _fitted(self, course: Array, frequencies: Array, orders: IntArray) -> LineSpectrum:
         """Gauss-Newton steps of the frequencies; coefficients are eliminated."""
         times, most = self.watch.times, PER_TERM * 2 * len(orders)
         some = np.arange(len(times))
@@ -164,7 +164,7 @@ class Torus:
             w = w + np.clip(step, -limit, limit)
             if np.abs(step).max() * times[-1] < SETTLED:
                 break
-        return Spectrum(w, np.concatenate([a, b]) * self._range, float(np.abs(rest).max()))
+        return LineSpectrum(w, np.concatenate([a, b]) * self._range, float(np.abs(rest).max()))
 
 
 def whole(base: int, order: int) -> IntArray:
