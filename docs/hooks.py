@@ -1,4 +1,4 @@
-"""What the site generates from the program itself: the help of every command."""
+"""What the site generates from the program itself: the help of every command, the table of findings."""
 
 from __future__ import annotations
 
@@ -8,8 +8,22 @@ import click
 
 
 def on_page_markdown(markdown: str, **_: Any) -> str:
-    """Put the commands where a page has the mark for them."""
-    return markdown.replace("<!-- commands -->", commands()) if "<!-- commands -->" in markdown else markdown
+    """Put what is generated where a page has the mark for it."""
+    for mark, generate in {"<!-- commands -->": commands, "<!-- findings -->": findings}.items():
+        markdown = markdown.replace(mark, generate()) if mark in markdown else markdown
+    return markdown
+
+
+def findings() -> str:
+    """The table of all kinds of findings of an identification."""
+    from shoal.findings import Kind
+    from shoal.identification import findings as kinds
+
+    rows = ["| code | severity | meaning | verdict | what to do |", "|---|---|---|---|---|"]
+    for one in vars(kinds).values():
+        if isinstance(one, Kind):
+            rows.append(f"| `{one.code}` | {one.severity} | {one.meaning} | {one.implies} | {one.remedy} |")
+    return "\n".join(rows)
 
 
 def commands() -> str:

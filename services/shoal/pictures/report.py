@@ -41,7 +41,7 @@ def findings(answer: Answer, moving: list[Motion] | None = None, drawn: list[Dra
         "answer_title": "The answer" if estimate.verdict.trusted else "Numbers that are no answer",
         "headings": ["parameter", "value", "standard deviation (noise)", "95 % interval", "known", *truth],
         "rows": _rows(answer),
-        "reasons": [_sentence(reason) for reason in estimate.message.split("; ") if reason],
+        "reasons": [_sentence(one.text) for one in estimate.findings],
         "remarks": _remarks(estimate),
         "motions": [animation(one, _machine(answer, one)) for one in moving],
         "pictures": [one.embedded() for one in drawn],

@@ -6,6 +6,8 @@ from itertools import combinations
 
 import numpy as np
 
+from shoal.findings import Finding
+from shoal.identification.findings import EXCHANGED
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods.starts import damped_steps, poses_and_slopes
 from shoal.identification.recording.source import Channel
@@ -22,8 +24,8 @@ _GAIN = 1e-3
 """A pose is found where a step promises to lower its squared error by less than this part."""
 
 
-def exchanged(model: ForwardModel) -> str | None:
-    """What to say where markers seem exchanged in a whole recording, which no continuity shows; else None.
+def exchanged(model: ForwardModel) -> Finding | None:
+    """Return what was found where markers seem exchanged in a whole recording, which no continuity shows; else None.
 
     Ten samples of each recording are compared with the poses that the model can take by its sought initial angles,
     the other parameters at their starts. Another assignment is named where it leaves a tenth of the deviation.
@@ -41,10 +43,9 @@ def exchanged(model: ForwardModel) -> str | None:
         if _BETTER * misfits[best] < misfits[0]:
             one, other = pairs[best - 1]
             where = f" in recording {name}" if len(model.measurement.recordings) > 1 else ""
-            return (
-                f"markers {one} and {other} seem exchanged{where}: the poses are off by {misfits[0]:.2g}, "
-                f"with both exchanged by {misfits[best]:.2g}"
-            )
+            text = f"markers {one} and {other} seem exchanged{where}: the poses are off by {misfits[0]:.2g}, "
+            text += f"with both exchanged by {misfits[best]:.2g}"
+            return EXCHANGED.found(text, before=float(misfits[0]), after=float(misfits[best]))
     return None
 
 

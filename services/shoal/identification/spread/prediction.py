@@ -15,6 +15,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from shoal.findings import Finding
+from shoal.identification import findings as kinds
 from shoal.identification.forward import ForwardModel
 from shoal.identification.recording.measurement import Held
 from shoal.identification.recording.units import of_channel
@@ -100,14 +102,16 @@ class Prediction:
         """How many times worse than stated it is: RMS over limit of the worst channel, nan where there is no limit."""
         return max((channel.rms / channel.limit for channel in self.channels), default=float("nan"))
 
-    def sentence(self, named: bool) -> str:
-        """The outcome in words; named: whether the recording has to be."""
+    def finding(self, named: bool) -> Finding:
+        """Return how well the window is predicted; named: whether the text names the recording."""
         begin, end = self.window
         known = self.inside is not None
         off = ", ".join(f"{c.name} {c.rms:.2g} {c.unit}" + f", limit {c.limit:.2g}" * known for c in self.channels)
         where = f" of {self.recording}" if named else ""
         held = {True: "as well as the estimate states", False: "worse than the estimate states", None: self.why}
-        return f"held out from {begin:g} s to {end:g} s{where}: predicted {held[self.inside]} (RMS: {off})"
+        kind = kinds.MISPREDICTED if self.inside is False else kinds.PREDICTION
+        text = f"held out from {begin:g} s to {end:g} s{where}: predicted {held[self.inside]} (RMS: {off})"
+        return kind.found(text, begin=begin, end=end, ratio=self.ratio)
 
     def to_json(self) -> dict[str, Any]:
         """What `--json` tells of it."""

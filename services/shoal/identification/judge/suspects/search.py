@@ -67,7 +67,7 @@ _SMALL = 3.0
 
 
 @dataclass(frozen=True)
-class Findings:
+class FaultSearch:
     """The suspects, those that explain most first, and by name and kind the fits of those that free numbers.
 
     better: a minimum of the model itself that fits better, if met; cut: whether time was up before all were tried
@@ -108,7 +108,7 @@ def suspects(
     *,
     test: ScoreTest | None = None,
     misfit: bool = True,
-) -> Findings:
+) -> FaultSearch:
     """Return what explains the residual at an answer, the best first. Runs are not counted.
 
     noise: what no explanation can go below [RMS]; test: of the hypotheses, that of a model without error by default
@@ -127,7 +127,7 @@ def suspects(
     listed = [suspect for suspect in found if suspect.after <= _FAR * found[0].after]
     refits = {(s.name, s.kind): search.refits[s.name, s.kind] for s in listed if (s.name, s.kind) in search.refits}
     named = [replace(s, alike=search.alike(s.name)) for s in listed]
-    return Findings(named, refits, search.better, cut, search.hypotheses)
+    return FaultSearch(named, refits, search.better, cut, search.hypotheses)
 
 
 class _Search:
