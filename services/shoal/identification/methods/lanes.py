@@ -2,7 +2,8 @@
 
 An iteration simulates the trial points of all descents together with their neighbours, side by side, so a Jacobian is
 there when its trial is accepted (Nielsen's damping rule; Madsen, Nielsen, Tingleff, Methods for non-linear least
-squares problems, 2004).
+squares problems, 2004). Unlike those of `numerics.levenberg_marquardt` these searches keep to active bounds, and leave
+where a better one is.
 """
 
 from __future__ import annotations

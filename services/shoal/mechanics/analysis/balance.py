@@ -172,8 +172,9 @@ class Balance:
     def descend(
         self, q: Array, turn: Callable[[Array, Array], float], follow: Callable[[Array], None], most: int = 400
     ) -> Root[Array]:
-        """Go down in the potential until nothing pulls any more (which is so on a summit, too).
+        """Descend in the potential to a stationary point, by Newton steps with absolute curvatures.
 
+        Unlike in `newton` the potential judges each step, and the damping depends on what lowers it.
         turn: the largest turn [rad] of a body between two states; follow: counts the turns, called after every step.
         """
         q, _ = self.restore(q)
@@ -222,9 +223,11 @@ class Balance:
     def creep(
         self, q: Array, turn: Callable[[Array, Array], float], follow: Callable[[Array], None], most: int = 400
     ) -> Root[Array]:
-        """Go where the forces pull, M dq/ds = Q, until nothing pulls any more; turn, follow: see `descend`.
+        """Follow the overdamped motion M dq/ds = Q to rest (pseudo-transient continuation).
 
-        No step is so long that it would go back to a place that pushes away.
+
+        Unlike in `newton` the damping is the time step of that motion: no step goes back to where it is unstable.
+        turn, follow: see `descend`
         """
         q, _ = self.restore(q)
         begin, view, slower, correction = q, self.look(q), 1.0, np.inf
