@@ -37,7 +37,7 @@ Documents = dict[str, bytes]
 
 
 @dataclass(frozen=True)
-class Kind:
+class EntryKind:
     """A kind of entry of the library. folder: its name there; one: in words; check: of a document, raises InputError.
 
     mark: the field that only its documents have; built_in: names that are taken; references: how a document names
@@ -101,8 +101,8 @@ def _check_study(document: Path) -> None:
 KINDS = {
     kind.folder: kind
     for kind in (
-        Kind("recordings", "recording", _check_recording, "path", references={("path",): ""}),
-        Kind(
+        EntryKind("recordings", "recording", _check_recording, "path", references={("path",): ""}),
+        EntryKind(
             *("scenes", "scene", _check_scene, "bodies", lambda name: _scene_named(name)),
             references={
                 ("expect", "*", "path"): "recordings",
@@ -110,7 +110,7 @@ KINDS = {
                 **{(part, "*", "*", "path"): "" for part in PARTS},
             },
         ),
-        Kind(
+        EntryKind(
             *("problems", "problem", _check_problem, "parameters", lambda name: name in built_in_problems()),
             references={
                 ("scene",): "scenes",
@@ -118,7 +118,7 @@ KINDS = {
                 ("recordings", "*", "path"): "recordings",
             },
         ),
-        Kind(
+        EntryKind(
             *("studies", "study", _check_study, KEY, lambda name: name in built_in_studies()),
             references={(KEY, "scene"): "scenes"},
         ),
@@ -131,7 +131,7 @@ def _scene_named(name: str) -> bool:
     return name in built_in_scenes() or parametric(name) is not None
 
 
-def kind_of(given: str) -> Kind:
+def kind_of(given: str) -> EntryKind:
     """The kind of that name, in the singular or the plural. Raises InputError."""
     for kind in KINDS.values():
         if given in (kind.folder, kind.one):
@@ -244,7 +244,7 @@ def _fits(more: Documents, files: Documents) -> bool:
     return all(files.get(path, content) == content for path, content in more.items())
 
 
-def _check(kind: Kind, document: Path) -> None:
+def _check(kind: EntryKind, document: Path) -> None:
     """Raises InputError, in which paths are those of the entry."""
     _check_paths(kind, document)
     try:
@@ -253,7 +253,7 @@ def _check(kind: Kind, document: Path) -> None:
         raise InputError(str(error).replace(f"{document.parent}/", "")) from None
 
 
-def _check_paths(kind: Kind, document: Path) -> None:
+def _check_paths(kind: EntryKind, document: Path) -> None:
     """Return whether a document names nothing but what is below it, and entries of the library. Raises InputError."""
     size = document.stat().st_size
     if size > LARGEST:

@@ -9,7 +9,7 @@ import numpy as np
 
 from shoal.findings import Finding
 from shoal.identification import findings as kinds
-from shoal.identification.adapt import Stage
+from shoal.identification.adapt import AdaptedModel
 from shoal.identification.carried import fitted, joint
 from shoal.identification.deadline import unless_late
 from shoal.identification.estimate import Estimate
@@ -67,7 +67,7 @@ def conclude(
     method: str,
     seed: int,
     wall: float,
-    stages: list[Stage],
+    stages: list[AdaptedModel],
     wishes: Wishes,
     rounds: int = _ROUNDS,
 ) -> Estimate:

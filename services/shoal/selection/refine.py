@@ -49,7 +49,7 @@ Progress = Callable[[str], None]
 
 
 @dataclass
-class Reference:
+class ReferenceModel:
     """The finest model that was run and the coarser one that agrees with it.
 
     candidate, error: the finest and its own estimated error [m]; base: levels of the coarser
@@ -140,7 +140,7 @@ class LevelRuns:
 
 def refine(
     runs: LevelRuns, rods: tuple[str, ...], fixed: Levels, tolerance: float, impatient: bool = False
-) -> Reference | str:
+) -> ReferenceModel | str:
     """Refine the rods until two meshes agree; else return the reason why none do.
 
     impatient: another theory remains: end also where runs are rejected, or a doubling of the elements gains little, as
@@ -168,7 +168,7 @@ def refine(
         error = left(gaps, fine.levels)[0] + sum(behind.values())
         if max(error, gaps[-1]) <= AGREE * tolerance:
             fine.error = error
-            return Reference(fine, error, {**fixed, **runs.refined(base)})
+            return ReferenceModel(fine, error, {**fixed, **runs.refined(base)})
         if impatient and max(count.values()) >= FINE and len(gaps) > 1 and gaps[-2] < GAIN * gaps[-1] < np.inf:
             return f"twice as many elements gain a factor of {gaps[-2] / gaps[-1]:.2g} only"
         if len(growing) > 1 and fine.ok:

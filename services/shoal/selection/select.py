@@ -19,7 +19,7 @@ from shoal.scene import Rod, Scene
 from shoal.selection.coarsen import WITHIN, coarsen
 from shoal.selection.levels import RIGID, SHEARS, SLENDER, STOUT, Levels, apply, open_rods
 from shoal.selection.prior import PriorEstimate, estimate
-from shoal.selection.refine import AGREE, PATIENCE, REFERENCE, LevelRuns, Progress, Reference, refine, settled
+from shoal.selection.refine import AGREE, PATIENCE, REFERENCE, LevelRuns, Progress, ReferenceModel, refine, settled
 from shoal.selection.run import Candidate, distance, fewest, rigid_scene, run
 from shoal.selection.strain_limits import excessive_torques
 from shoal.trajectory import Array, Status, Trajectory, plain
@@ -328,7 +328,7 @@ def _flexible(
     worst: a priori error of rigid rods, where nothing better is known [m]
     """
     within, reference = task.tolerance, refine(runs, rods, fixed, task.tolerance - known, another)
-    if not another and isinstance(reference, Reference):
+    if not another and isinstance(reference, ReferenceModel):
         within = _for_mesh(task.tolerance, reference.candidate, known)
         if reference.error > AGREE * (within - known):
             reference = refine(runs, rods, fixed, within - known)

@@ -14,7 +14,7 @@ import numpy as np
 from shoal.findings import Finding
 from shoal.identification.findings import OTHER_LAW
 from shoal.identification.forward import ForwardModel
-from shoal.identification.judge.suspects.candidate import Candidate
+from shoal.identification.judge.suspects.candidate import FaultHypothesis
 from shoal.identification.judge.suspects.fits import Together
 from shoal.identification.judge.suspects.of_machine import RESISTING, resisting
 from shoal.identification.judge.suspects.size import size_of
@@ -49,7 +49,7 @@ class OtherLaw:
 def other_laws(model: ForwardModel, point: Array, seen: Sensitivity) -> list[OtherLaw]:
     """Each friction that is sought, with each other law that its joint may have. Runs are not counted."""
     taken = {*model.parameters.paths, *model.problem.ties}
-    asked, beside = list[tuple[str, str, str]](), dict[tuple[str, str], Candidate]()
+    asked, beside = list[tuple[str, str, str]](), dict[tuple[str, str], FaultHypothesis]()
     for name, path in zip(model.names, model.parameters.paths, strict=True):
         where, _, field = path.rpartition(".")
         joint_name = where.removeprefix("joints.")

@@ -31,7 +31,7 @@ _LOUD, _LARGE = 1.5, 3.0
 
 
 @dataclass(frozen=True)
-class _Stretch:
+class _SampleRange:
     """Samples from first to last of channels (by number) of a recording, of one place."""
 
     recording: str
@@ -76,7 +76,7 @@ def odd_stretch(model: ForwardModel, point: Array) -> Finding | None:
     return ODD_STRETCH.found(f"without {names} the rest fits, and leaves {size}", step, residual=left)
 
 
-def _stretches(model: ForwardModel, residual: Array) -> Iterator[_Stretch]:
+def _stretches(model: ForwardModel, residual: Array) -> Iterator[_SampleRange]:
     """Of each place, samples in a row that are off, and hardly any between them."""
     rows = model.rows
     usual = np.maximum(rows.estimated * rows.weight, _MAD * float(np.median(np.abs(residual))))
@@ -88,14 +88,14 @@ def _stretches(model: ForwardModel, residual: Array) -> Iterator[_Stretch]:
             samples = np.searchsorted(run.times, np.unique(rows.time[mine]))
             for part in _in_a_row(samples):
                 if _FEWEST <= len(part) <= _MOST * len(run.times):
-                    yield _Stretch(name, place, channels, int(part[0]), int(part[-1]))
+                    yield _SampleRange(name, place, channels, int(part[0]), int(part[-1]))
 
 
 def _in_a_row(samples: npt.NDArray[np.intp]) -> list[npt.NDArray[np.intp]]:
     return np.split(samples, np.flatnonzero(np.diff(samples) > _GAP) + 1)
 
 
-def _without(model: ForwardModel, stretches: list[_Stretch]) -> ForwardModel:
+def _without(model: ForwardModel, stretches: list[_SampleRange]) -> ForwardModel:
     """The model without these samples."""
     recordings = dict(model.measurement.recordings)
     for one in stretches:

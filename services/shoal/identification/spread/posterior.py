@@ -51,7 +51,7 @@ _NEWS = 0.2
 
 
 @dataclass(frozen=True)
-class Marginal:
+class PosteriorMarginal:
     """Of one parameter in its own unit: moments, median, the central 95 %, and how much the draws are worth for it.
 
     size, tail: effective sizes for the middle and for the tails, see `mixing`
@@ -76,7 +76,7 @@ class Posterior:
 
     names: tuple[str, ...]
     draws: Array
-    marginals: dict[str, Marginal]
+    marginals: dict[str, PosteriorMarginal]
     noise: str
     wanted: int
     converged: bool
@@ -250,11 +250,11 @@ def _told(
     )
 
 
-def _marginal(draws: Array) -> Marginal:
+def _marginal(draws: Array) -> PosteriorMarginal:
     """Of one parameter's draws (ensembles, steps, walkers)."""
     # Ranks are scipy's, which an identification without draws need not load.
     from shoal.identification.spread.mixing import bulk_size, r_hat, tail_size
 
     lower, median, upper = (float(x) for x in np.quantile(draws, [0.5 - LEVEL / 2, 0.5, 0.5 + LEVEL / 2]))
     sizes = bulk_size(draws), tail_size(draws), r_hat(draws)
-    return Marginal(float(draws.mean()), float(draws.std(ddof=1)), median, lower, upper, *sizes)
+    return PosteriorMarginal(float(draws.mean()), float(draws.std(ddof=1)), median, lower, upper, *sizes)

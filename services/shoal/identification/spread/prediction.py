@@ -18,7 +18,7 @@ import numpy.typing as npt
 from shoal.findings import Finding
 from shoal.identification import findings as kinds
 from shoal.identification.forward import ForwardModel
-from shoal.identification.recording.measurement import Held
+from shoal.identification.recording.measurement import HeldOut
 from shoal.identification.recording.units import of_channel
 from shoal.identification.spread.covariance import Block, Noise
 from shoal.identification.spread.given import EXACT, Given
@@ -150,7 +150,7 @@ def predictions(
 
 
 def _predicted(
-    model: ForwardModel, point: Array, name: str, held: Held, fit: Fit | None, error: ModelError
+    model: ForwardModel, point: Array, name: str, held: HeldOut, fit: Fit | None, error: ModelError
 ) -> Prediction:
     channels = model.measurement.recordings[name].channels
     window = _of_window(model, name, held)
@@ -207,7 +207,7 @@ def _predicted(
     return Prediction(name, held.window, told_of, held.times, held.values, predicted, half, larger, why)
 
 
-def _of_window(model: ForwardModel, name: str, held: Held) -> ForwardModel:
+def _of_window(model: ForwardModel, name: str, held: HeldOut) -> ForwardModel:
     """The model of the samples of a window. Other recordings stay with one sample, as parameters are named by them."""
     recordings = {
         other: replace(one, times=one.times[:1], values=np.zeros((1, len(one.channels))))
