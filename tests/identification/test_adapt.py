@@ -28,7 +28,8 @@ def test_a_mesh_error_above_the_noise_is_named() -> None:
     coarse = {"bodies.OA.elements": 3, "bodies.AB.elements": 5}
     estimate = identify(problem, values=coarse, measurement=data)
     (limit,) = [one for one in estimate.findings if one.code == "mesh-error"]
-    assert limit.numbers["error"] > limit.numbers["noise"] == 0.001
+    assert limit.numbers["noise"] == pytest.approx(0.001)
+    assert limit.numbers["error"] > limit.numbers["noise"]
     assert limit.numbers["tolerance"] == pytest.approx(0.001 / 3)
 
 
