@@ -63,7 +63,7 @@ def _ways() -> str:
     multiple=True,
     metavar='"MARKER.QUANTITY < NUMBER"',
     help="What must not happen (repeatable), the opposite of --require; also JOINT.force, .torque, energy, .strain and "
-    "so on (docs/uncertain.md).",
+    "so on (docs/reference/uncertain.md).",
 )
 @click.option(
     "--require",

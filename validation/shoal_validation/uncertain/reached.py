@@ -99,8 +99,8 @@ def double_pendulum(count: int) -> Iterator[Reached]:
     assert found.mesh_error is not None
     yield Reached(
         f"double pendulum, {count} intervals, mesh",
-        "bounds of the continuum within the mesh error told",
-        f"moved by {moved:.2e} m on four times the elements, {found.mesh_error:.2e} m told",
+        "bounds of the continuum within the estimated mesh error",
+        f"moved by {moved:.2e} m on four times the elements, {found.mesh_error:.2e} m estimated",
         moved <= found.mesh_error,
     )
 

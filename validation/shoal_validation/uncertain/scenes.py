@@ -229,7 +229,7 @@ STUDIES = (
         (0.05, 0.1, 0.15, 0.2, 0.3),
     ),
     Asked(
-        "a slider-crank that passes its singular place",
+        "a slider-crank that passes its singular position",
         "equal-slider-crank",
         {"bodies.crank.mass": (0.5, 1.5), "bodies.rod.mass": (0.5, 1.5), "initial.crank.rate": (5.9, 6.0)},
         _AFTER[:4],
