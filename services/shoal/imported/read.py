@@ -142,7 +142,7 @@ def _rest(data: dict[str, Any], scene: Scene, away: dict[str, float]) -> None:
     """States the angles [rad], as the mechanics counts them, of torsion springs that rest so far from the start."""
     from shoal.mechanics.assembly.loads import Loads
     from shoal.mechanics.assembly.placement import place
-    from shoal.mechanics.rows import Rows
+    from shoal.mechanics.derived import Rows
 
     if away:
         loads = Loads(scene, place(scene), Rows(0), 0.0)

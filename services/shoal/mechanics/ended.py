@@ -11,10 +11,10 @@ import numpy as np
 
 from shoal.mechanics.assembly.loads import Loads
 from shoal.mechanics.assembly.placement import place
+from shoal.mechanics.derived import Rows
 from shoal.mechanics.forces import ANGLE
 from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import Array
-from shoal.mechanics.rows import Rows
 from shoal.scene.ended import BodyState, End, mesh_of
 
 

@@ -11,7 +11,7 @@ from shoal.errors import InputError
 from shoal.mechanics import plane
 from shoal.mechanics.affine import Affine, combined, fixed
 from shoal.mechanics.elements.element import Element
-from shoal.mechanics.modal.numbers import Modes
+from shoal.mechanics.modal.modes import Modes
 from shoal.mechanics.numerics.tile import Number
 
 Place = tuple[Number, ...]

@@ -18,7 +18,6 @@ from shoal.mechanics import plane
 from shoal.mechanics import reach as reaches
 from shoal.mechanics.assembly.groups import start_angle
 from shoal.mechanics.assembly.redundancy import redundant_joints
-from shoal.mechanics.assembly.space import start as spatial
 from shoal.mechanics.assembly.starts import Starts
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.ended import Ended
@@ -224,10 +223,7 @@ class Runs:
     def _started(self, begun: Array) -> dict[str, Any]:
         """The start as it is used, what of it was stated otherwise, and joints whose forces are not unique."""
         scene, model = self.scene, self.model
-        if scene.dimensions == 3:
-            used = spatial.begun(model.frames, *np.split(begun, 2))
-        else:
-            used = start.begun(model.frames, model.scene, *np.split(begun, 2))
+        used = start.begun(model.frames, model.scene, *np.split(begun, 2))
         redundant = () if start.is_direct(scene) else redundant_joints(scene, used)
         told = start.facts(scene, used, float(reaches.size(scene))) | {"redundant_joints": list(redundant)}
         return dict(plain(told))
@@ -260,12 +256,10 @@ class Changes(Sequence[Mapping[str, Any]]):
     def _found(self) -> list[dict[str, Any]]:
         model, lanes = self.model, self.model.lanes
         stated = model.stated
-        if stated.dimensions == 2 and not stated.starts_at_rest and start.is_direct(stated):
+        if not stated.starts_at_rest and start.is_direct(stated):
             return [{} for _ in range(lanes)]
         q, v = (np.broadcast_to(x, (len(x), lanes)) for x in (model.q0, model.v0))
-        space = stated.dimensions == 3
-        used = spatial.begun(model.frames, q, v) if space else start.begun(model.frames, model.scene, q, v)
-        found = start.changes(stated, used, reaches.size(stated), lanes)
+        found = start.changes(stated, start.begun(model.frames, model.scene, q, v), reaches.size(stated), lanes)
         failed = np.broadcast_to(model.failed, lanes)
         return [{} if none else one for one, none in zip(found, failed, strict=True)]
 

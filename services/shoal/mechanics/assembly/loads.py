@@ -17,12 +17,12 @@ from shoal.mechanics.assembly.groups import start_angle
 from shoal.mechanics.assembly.rods import rod_axis
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
 from shoal.mechanics.assembly.space.hinges import axis_of, turning
+from shoal.mechanics.derived import Rows
 from shoal.mechanics.forces import ANGLE, DISTANCE, PLACE, Forces
 from shoal.mechanics.frames import BeamFrame, ModalFrame, RigidFrame
 from shoal.mechanics.functions import Piecewise
 from shoal.mechanics.numerics.tile import Number, index, stacked
 from shoal.mechanics.reach import span
-from shoal.mechanics.rows import Rows
 from shoal.scene import (
     GROUND,
     Attachment,

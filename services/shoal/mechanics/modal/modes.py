@@ -11,6 +11,8 @@ where w_i is: w_i = v e - u e_perp.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -20,7 +22,6 @@ from shoal.mechanics import joints
 from shoal.mechanics.joints import Geared, Sum, Turned
 from shoal.mechanics.modal import beams
 from shoal.mechanics.modal.beams import Ends
-from shoal.mechanics.modal.numbers import Modes, Shapes
 from shoal.mechanics.numerics.tile import Array, Number
 from shoal.scene import ModalBody, Rod, Scene
 
@@ -28,6 +29,25 @@ _POINTS = 24
 """Points of Gauss's rule along a rod, and so many more a mode."""
 _NOTHING = 1e-12
 """An integral below this, of the size it could have, is zero."""
+Shapes = Callable[[tuple[Number, ...]], tuple[list[Any], list[Any]]]
+
+
+@dataclass(frozen=True)
+class Modes:
+    """across: how many have a vector of their own; along: how many of a rod stretch it, first evenly.
+
+    moments: Hermitian, (2 + across, 2 + across, lanes), the first two of the frame; stiffness, damping: (modes, modes,
+    lanes), first those across; shapes: place -> complex displacement and slope (that of the body's x direction) of
+    every mode there; length [m]: of a rod.
+    """
+
+    across: int
+    along: int
+    length: Number
+    moments: Array
+    stiffness: Array
+    damping: Array
+    shapes: Shapes
 
 
 def modes_of(scene: Scene, name: str) -> Modes:

@@ -7,15 +7,16 @@ Stated values that miss by the rounding of their digits are corrected in the ord
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from shoal.errors import InputError
 from shoal.mechanics import plane
+from shoal.mechanics import rotation as turns
 from shoal.mechanics.affine import Affine
-from shoal.mechanics.frames import Frame, ModalFrame
+from shoal.mechanics.frames import Frame, ModalFrame, RigidFrame
 from shoal.mechanics.joints import Meet, of_scene
 from shoal.mechanics.numerics.tile import Array, Flags, Number
 from shoal.mechanics.start.closure import Rows
@@ -248,31 +249,48 @@ def _written(values: Array) -> str:
 
 
 def begun(frames: Mapping[str, Frame], scene: Scene, q: Array, v: Array) -> dict[str, InitialState]:
-    """The state of every body at the coordinates q and rates v of a machine, each (unknowns,); scene: started.
+    """Return the state of every body at the coordinates q and rates v of a machine, each (unknowns,).
 
+    scene: in the plane with a complete start, to whose angles whole turns are counted. In space rods have no attitude.
     Of (unknowns, lanes) its numbers are arrays, without modes.
     """
     found = {}
-    origin = (0.0,) * plane.DIMENSIONS
+    origin = (0.0,) * scene.dimensions
     for name, frame in frames.items():
-        modes, mode_rates = tuple[float, ...](), tuple[float, ...]()
-        if isinstance(frame, ModalFrame):
-            place, axis = frame.origin, frame.directors[0]
-            modes, mode_rates = _bending(frame, q, v) if q.ndim == 1 else (modes, mode_rates)
+        place = frame.origin if isinstance(frame, ModalFrame) else frame.point(origin)
+        if scene.dimensions == plane.DIMENSIONS:
+            attitude = _angle(frame, scene.start(name).angle, q, v)
         else:
-            place, axis = frame.point(origin), frame.direction(origin)
-        near, along, turning = scene.start(name).angle, place_at(axis, q), rate_at(axis, v)
-        turn = plane.angle(along) - near
+            attitude = _rotation(frame, q, v) if isinstance(frame, RigidFrame) else {}
         found[name] = InitialState.model_construct(
-            angle=_number(near + turn - 2 * np.pi * np.rint(turn / (2 * np.pi))),
-            rate=_number(plane.cross(along, turning) / sum(along**2)),
-            position=tuple(map(_number, place_at(place, q))),
-            velocity=tuple(map(_number, rate_at(place, v))),
-            modes=modes,
-            mode_rates=mode_rates,
-            guess=(),
+            position=_numbers(place_at(place, q)), velocity=_numbers(rate_at(place, v)), guess=(), **attitude
         )
     return found
+
+
+def _angle(frame: Frame, near: Number, q: Array, v: Array) -> dict[str, Any]:
+    """The angle of a body in the plane, its rate, and its modes; near: an angle that tells the whole turns [rad]."""
+    modes, mode_rates = tuple[float, ...](), tuple[float, ...]()
+    if isinstance(frame, ModalFrame):
+        axis = frame.directors[0]
+        modes, mode_rates = _bending(frame, q, v) if q.ndim == 1 else (modes, mode_rates)
+    else:
+        axis = frame.direction((0.0,) * plane.DIMENSIONS)
+    along, turning = place_at(axis, q), rate_at(axis, v)
+    turn = plane.angle(along) - near
+    angle = near + turn - 2 * np.pi * np.rint(turn / (2 * np.pi))
+    (angle, rate) = _numbers([angle, plane.cross(along, turning) / sum(along**2)])
+    return {"angle": angle, "rate": rate, "modes": modes, "mode_rates": mode_rates}
+
+
+def _rotation(frame: RigidFrame, q: Array, v: Array) -> dict[str, Any]:
+    """The rotation vector and the spin of a rigid body in space."""
+    directors = np.array([place_at(one, q) for one in frame.directors])
+    turning = np.array([rate_at(one, v) for one in frame.directors])
+    lanes = directors.reshape(*directors.shape[:2], -1).swapaxes(0, 1)
+    vectors = np.stack([turns.vector_of(lanes[..., lane]) for lane in range(lanes.shape[2])], axis=1)
+    spin = 0.5 * np.sum(np.cross(directors, turning, axis=1), axis=0)
+    return {"rotation": _numbers(vectors.reshape(spin.shape)), "spin": _numbers(spin)}
 
 
 def _bending(frame: ModalFrame, q: Array, v: Array) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -283,9 +301,9 @@ def _bending(frame: ModalFrame, q: Array, v: Array) -> tuple[tuple[float, ...], 
     return modes, tuple(float(e @ one.rate(v) + turning @ one.at(q)) for one, _ in frame.measured)
 
 
-def _number(x: Any) -> Any:
-    """A number of Python, or an array over lanes as it is."""
-    return x if np.ndim(x) else float(x)
+def _numbers(parts: Iterable[Any]) -> tuple[Any, ...]:
+    """Numbers of Python, or arrays over lanes as they are."""
+    return tuple(x if np.ndim(x) else float(x) for x in parts)
 
 
 def place_at(vector: Affine, q: Array) -> Array:

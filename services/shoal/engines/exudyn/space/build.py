@@ -18,10 +18,11 @@ from shoal.engines.exudyn.space.ends import SpatialEnds
 from shoal.engines.exudyn.space.joints import add_friction, add_joint, still
 from shoal.engines.exudyn.space.loads import add_load
 from shoal.mechanics.assembly.groups import moving
-from shoal.mechanics.assembly.space.start import begun, place_started
+from shoal.mechanics.assembly.space.start import place_started
 from shoal.mechanics.frames import BeamFrame, PointFrame
 from shoal.mechanics.numerics.tile import stacked
 from shoal.mechanics.reach import span
+from shoal.mechanics.start.start import begun
 from shoal.scene import GROUND, ModalBody, PointMass, Rod, Scene
 from shoal.scene.dimensions import padded
 
@@ -74,7 +75,7 @@ def build_in_space(
     exchanges += [add_load(ends, name, load) for name, load in scene.loads.items()]
     mbs.Assemble()
     reference = mbs.systemData.GetODE2Coordinates(configuration=exu.ConfigurationType.Reference)
-    started = scene.model_copy(update={"initial": begun(placement.frames, q, v)})
+    started = scene.model_copy(update={"initial": begun(placement.frames, scene, q, v)})
     dependent = _dependent(exu, mbs) if any(loops(scene)) else 0
     return Machine(
         started, system, mbs, container, clock, parts, gaps, exchanges, span(scene), np.array(reference), dependent

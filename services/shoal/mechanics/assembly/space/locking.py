@@ -15,7 +15,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from shoal.errors import InputError
-from shoal.mechanics.assembly.space.values import uncancelled
 from shoal.mechanics.numerics.newton import newton
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.term_values import TermValues
@@ -43,7 +42,7 @@ def require_unlocked(scene: Scene, terms: Sequence[Term], q: Array) -> None:
     """Raises InputError where constraints forbid a motion at the coordinates q, (unknowns,), by rounding only."""
     if not terms or len(q) >= LARGEST:
         return
-    length = np.array([uncancelled(term, q) for term in terms])
+    length = np.array([_uncancelled(term, q) for term in terms])
     values = TermValues(terms, 3).of_lane(0)
 
     def gap(q: Array) -> Array:
@@ -61,6 +60,15 @@ def require_unlocked(scene: Scene, terms: Sequence[Term], q: Array) -> None:
             f"joints.{first}: {beside} forbids a motion by {found.off:.1g} rad, as rounded axes, rotations or places "
             "do; state them with more digits"
         )
+
+
+def _uncancelled(term: Term, q: Array) -> float:
+    """The length that the row of a constraint would have in the first lane if nothing in it were at right angles."""
+    u, w = (vector.at(q) for vector in (term.u, term.w))
+    squares = 0.0
+    for vector, other in ((term.u, term.form @ w), (term.w, term.form.T @ u)):
+        squares += float(np.sum(vector.by_lane[1][0] ** 2) * (other @ other))
+    return float(np.sqrt(squares)) + 1e-300
 
 
 def joints_of(scene: Scene, names: Collection[str]) -> tuple[str, ...]:

@@ -18,10 +18,9 @@ import numpy as np
 from shoal.mechanics import joints, reach
 from shoal.mechanics import rotation as turns
 from shoal.mechanics.affine import Affine, combined, fixed
+from shoal.mechanics.assembly.coordinates import Pose, arm
 from shoal.mechanics.assembly.groups import JointPoint, is_stiff, rotated, transposed
-from shoal.mechanics.assembly.holding import hold
-from shoal.mechanics.assembly.order import next_body, place_driver, place_point
-from shoal.mechanics.assembly.pose import Pose, arm
+from shoal.mechanics.assembly.placing import hold, next_body, place_driver, place_point
 from shoal.mechanics.assembly.space.axes import JointAxis
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
 from shoal.mechanics.assembly.space.hinges import make_axes

@@ -19,20 +19,16 @@ from shoal.mechanics.affine import Affine
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
 from shoal.mechanics.assembly.space.locking import require_unlocked
 from shoal.mechanics.assembly.space.placement import place_in_space
-from shoal.mechanics.assembly.space.values import at, of_lane
 from shoal.mechanics.frames import BeamFrame, Frame, PointFrame, RigidFrame
 from shoal.mechanics.numerics.tile import Array, stacked
-from shoal.mechanics.start.start import place_at, rate_at
+from shoal.mechanics.start.poses import CLOSED, ROUNDING
+from shoal.mechanics.start.start import place_at
 from shoal.mechanics.start.strained import gives_way, require_numbers
 from shoal.mechanics.term_values import TermValues
-from shoal.scene import InitialState, Scene
+from shoal.scene import Scene
 from shoal.scene.initial import Quantity
 from shoal.scene.paths import lanes_of
 
-CLOSED = 1e-11
-"""A joint that gapes by less, relative to the size of the machine, is closed."""
-ROUNDING = 1e-4
-"""Stated values may miss by so much, relative to the size of the machine or in rad, and are then corrected."""
 STRAIN = 1e-6
 """Nodes of a flexible rod that closing the joints would move by more, relative to the size of the machine, are not."""
 ITERATIONS = 60
@@ -221,7 +217,7 @@ class _Closing:
         """
         for name, frame in self.placement.frames.items():
             if isinstance(frame, BeamFrame):
-                moved = (np.max(np.abs(at(one, before, lane) - at(one, after, lane))) for one in frame.vectors)
+                moved = (np.max(np.abs(_at(one, before, lane) - _at(one, after, lane))) for one in frame.vectors)
                 if max(moved) > STRAIN * max(self.size, 1.0):
                     if self.gives_way:
                         require_numbers(self.scene)
@@ -260,7 +256,7 @@ class _Closing:
         """Return whether a body has become its own mirror image."""
         for frame in self.placement.frames.values():
             if isinstance(frame, RigidFrame):
-                directors = np.array([at(one, q, lane) for one in frame.directors])
+                directors = np.array([_at(one, q, lane) for one in frame.directors])
                 if np.linalg.det(directors) < 0:
                     return True
         return False
@@ -275,8 +271,8 @@ class _Closing:
                     continue
                 for vector, target in self._targets(body, frame, quantity, value, lane):
                     for k in range(3):
-                        parts = [(unknown, float(of_lane(one, lane)[k])) for unknown, one in vector.terms.items()]
-                        wanted = target[k] - of_lane(vector.constant, lane)[k] * (quantity in _POSES)
+                        parts = [(unknown, float(_of_lane(one, lane)[k])) for unknown, one in vector.terms.items()]
+                        wanted = target[k] - _of_lane(vector.constant, lane)[k] * (quantity in _POSES)
                         found.append(_Stated(parts, float(wanted), quantity, body, quantity not in start.guess))
         return found
 
@@ -292,11 +288,11 @@ class _Closing:
         if quantity in ("angle", "rotation"):
             rotation = self.placement.attitudes.stated(body)
             assert rotation is not None
-            return [(one, of_lane(rotation[:, k], lane)) for k, one in enumerate(frame.directors)]
+            return [(one, _of_lane(rotation[:, k], lane)) for k, one in enumerate(frame.directors)]
         turning = self.placement.attitudes.stated_spin(body)
         assert turning is not None
-        spin = of_lane(turning, lane)
-        return [(one, np.cross(spin, at(one, self.q, lane))) for one in frame.directors]
+        spin = _of_lane(turning, lane)
+        return [(one, np.cross(spin, _at(one, self.q, lane))) for one in frame.directors]
 
     def _rates(self, lane: int) -> _Rates:
         scale = np.array([self.size**term.lengths for term in self.moving_terms])
@@ -324,8 +320,8 @@ class _Closing:
                 rates = np.zeros((len(frame.vectors), 3, len(q)))
                 for one, row in zip(frame.vectors, rates, strict=True):
                     for unknown, coefficient in one.terms.items():
-                        row[:, unknown] = of_lane(coefficient, lane)
-                turning = [-turns.skew(at(one, q, lane)) for one in frame.vectors]
+                        row[:, unknown] = _of_lane(coefficient, lane)
+                turning = [-turns.skew(_at(one, q, lane)) for one in frame.vectors]
                 moving = [np.eye(3) * (k % len(frame.nodes[0]) == 0) for k in range(len(turning))]
                 motions = np.linalg.svd(np.hstack([np.vstack(turning), np.vstack(moving)]), full_matrices=False)
                 rigid = motions.U[:, DEPENDENT * motions.S[0] < motions.S]
@@ -384,12 +380,12 @@ class _Closing:
 
     def _mass(self, lane: int) -> Array:
         from shoal.mechanics.assembly.masses import Masses
-        from shoal.mechanics.rows import Rows
+        from shoal.mechanics.derived import Rows
 
         count = len(self.q)
         matrix = np.zeros((count, count))
         for (i, j), value in Masses(self.scene, self.placement, Rows(count)).mass.items():
-            matrix[i, j] = matrix[j, i] = of_lane(np.atleast_1d(value)[None], lane)[0]
+            matrix[i, j] = matrix[j, i] = _of_lane(np.atleast_1d(value)[None], lane)[0]
         return matrix
 
 
@@ -397,40 +393,14 @@ _POSES: tuple[Quantity, ...] = ("position", "rotation", "angle")
 _RATES: tuple[Quantity, ...] = ("velocity", "spin", "rate")
 
 
-def begun(frames: dict[str, Frame], q: Array, v: Array) -> dict[str, InitialState]:
-    """State of every body at the coordinates q and rates v of a machine, each (unknowns,); rods have no attitude.
-
-    Of (unknowns, lanes) its numbers are arrays.
-    """
-    found = {}
-    for name, frame in frames.items():
-        place = frame.point((0.0, 0.0, 0.0))
-        turn: list[Any] | None = None
-        spin: list[Any] | None = None
-        if isinstance(frame, RigidFrame):
-            directors = np.array([place_at(one, q) for one in frame.directors])
-            turning = np.array([rate_at(one, v) for one in frame.directors])
-            turn = _told(_vectors(directors.swapaxes(0, 1)))
-            spin = _told(0.5 * np.sum(np.cross(directors, turning, axis=1), axis=0))
-        found[name] = InitialState.model_construct(
-            angle=None,
-            rate=None,
-            position=tuple(_told(place_at(place, q))),
-            velocity=tuple(_told(rate_at(place, v))),
-            rotation=None if turn is None else (turn[0], turn[1], turn[2]),
-            spin=None if spin is None else (spin[0], spin[1], spin[2]),
-            guess=(),
-        )
-    return found
+def _of_lane(rows: Array, lane: int) -> Array:
+    """A column of (rows, lanes) or (rows, 1)."""
+    return np.asarray(rows[:, lane if rows.shape[1] > 1 else 0])
 
 
-def _vectors(rotation: Array) -> Array:
-    """The rotation vector [rad] of a matrix (3, 3), or of all lanes (3, 3, lanes)."""
-    if rotation.ndim == 2:
-        return turns.vector_of(rotation)
-    return np.stack([turns.vector_of(rotation[..., lane]) for lane in range(rotation.shape[2])], axis=1)
-
-
-def _told(vector: Array) -> list[Any]:
-    """Components: numbers of Python, or arrays over lanes."""
-    return vector.tolist() if vector.ndim == 1 else list(vector)
+def _at(vector: Affine, q: Array, lane: int) -> Array:
+    """A vector at the coordinates (unknowns,) or (unknowns, lanes) of a lane, (3,)."""
+    column = q if q.ndim == 1 else _of_lane(q, lane)
+    unknowns, coefficients, constants = vector.by_lane
+    own = min(lane, len(constants) - 1)
+    return np.asarray(constants[own] + column[unknowns] @ coefficients[own])

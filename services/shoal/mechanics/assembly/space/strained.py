@@ -14,8 +14,8 @@ import numpy as np
 
 from shoal.mechanics import joints
 from shoal.mechanics import rotation as turns
+from shoal.mechanics.assembly.coordinates import Pose
 from shoal.mechanics.assembly.groups import transposed
-from shoal.mechanics.assembly.pose import Pose
 from shoal.mechanics.assembly.rods import node_of
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
 from shoal.mechanics.assembly.space.sections import arc, flexible, material, turn_of
