@@ -7,12 +7,14 @@ need no multiplier and have no drift.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
+from shoal.mechanics import plane
 from shoal.mechanics.numerics.tile import Array, Number
 
 ROUND_OFF = 1e-12
@@ -100,3 +102,32 @@ def combined(vectors: tuple[Affine, ...], factors: tuple[Number, ...]) -> Affine
         if np.any(factor):
             total = total + one * factor
     return total
+
+
+class Points(NamedTuple):
+    """Vectors that are affine in the coordinates: matrix (vectors, d, unknowns) and constant (vectors, d)."""
+
+    matrix: Array
+    constant: Array
+
+    def at(self, q: Array) -> Array:
+        """The vectors at the coordinates q, (vectors, d)."""
+        return self.matrix @ q + self.constant
+
+    def turning(self, q: Array) -> Array:
+        """Return the derivatives of the angles [rad] of directions at q, about z, (vectors, unknowns)."""
+        now = self.at(q)[:, :2]
+        x, y = self.matrix.transpose(1, 0, 2)[:2]
+        return np.asarray(plane.cross(now.T[..., None], (x, y)) / np.sum(now**2, axis=1)[:, None])
+
+
+def points(vectors: Sequence[Affine], unknowns: int, lane: int = 0) -> Points:
+    """Vectors of a placement as one matrix, in one of its lanes."""
+    dimensions = len(vectors[0].constant) if vectors else plane.DIMENSIONS
+    matrix = np.zeros((len(vectors), dimensions, unknowns))
+    constant = np.zeros((len(vectors), dimensions))
+    for k, vector in enumerate(vectors):
+        constant[k] = vector.constant[:, lane % vector.constant.shape[1]]
+        for unknown, coefficient in vector.terms.items():
+            matrix[k, :, unknown] += coefficient[:, lane % coefficient.shape[1]]
+    return Points(matrix, constant)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
+from shoal.mechanics.affine import points
 from shoal.mechanics.analysis.equilibrium import Equilibrium
-from shoal.mechanics.analysis.evaluate import points
 from shoal.mechanics.machine import Machine
 from shoal.mechanics.numerics.tile import stacked
 from shoal.pictures.motion import Motion, traced_out

@@ -92,7 +92,7 @@ def _pose_misfit(model: ForwardModel, name: str, angles: list[int], wanted: Arra
 
     found = levenberg_marquardt(
         evaluate, damped_steps, points[:, angles], gain=_GAIN, most=_ITERATIONS,
-        project=lambda at: (at + np.pi) % (2 * np.pi) - np.pi,
+        move=lambda at, step: (at + step + np.pi) % (2 * np.pi) - np.pi,
     )  # fmt: skip
     nearest = found.norms.reshape(*wanted.shape[:2], _NEAREST).min(axis=2)
     return np.asarray(np.sqrt(np.mean(nearest**2, axis=1)))

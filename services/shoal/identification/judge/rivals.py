@@ -99,7 +99,7 @@ def _descended(model: ForwardModel, points: Array, across: Array, limit: float) 
     found = levenberg_marquardt(
         lambda points, _: differentiate_many(model, points), solve, np.clip(points, model.lower, model.upper),
         gain=0.0, close=float(np.sqrt(limit * model.rows.samples)), most=_STEPS,
-        project=lambda points: np.clip(points, model.lower, model.upper),
+        move=lambda points, step: np.clip(points + step, model.lower, model.upper),
     )  # fmt: skip
     return found.points, model.cost(found.residuals)
 

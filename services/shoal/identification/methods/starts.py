@@ -108,7 +108,7 @@ def _poses(model: ForwardModel, name: str, middle: Array, angles: list[int], pos
 
     found = levenberg_marquardt(
         evaluate, damped_steps, points[:, angles], gain=_GAIN, close=_CLOSE, most=_ITERATIONS,
-        project=lambda at: np.clip(at, model.lower[angles], model.upper[angles]),
+        move=lambda at, step: np.clip(at + step, model.lower[angles], model.upper[angles]),
     )  # fmt: skip
     points[:, angles] = found.points
     # Not every pose of a closed loop can be assembled.

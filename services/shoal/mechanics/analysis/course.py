@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shoal.mechanics.analysis.evaluate import Evaluator, points
+from shoal.mechanics.affine import points
+from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.analysis.felt import TURN, Felt, quarter
 from shoal.mechanics.assembly.build import build
 from shoal.mechanics.frames import RigidFrame

@@ -9,9 +9,9 @@ import numpy as np
 
 from shoal.mechanics import plane
 from shoal.mechanics import rotation as turns_of
-from shoal.mechanics.affine import Affine
+from shoal.mechanics.affine import Affine, points
 from shoal.mechanics.analysis import triads
-from shoal.mechanics.analysis.evaluate import Evaluator, points
+from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.assembly.build import build
 from shoal.mechanics.assembly.groups import place_of
 from shoal.mechanics.frames import BeamFrame, Frame, PointFrame

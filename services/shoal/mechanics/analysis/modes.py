@@ -16,12 +16,13 @@ import numpy.typing as npt
 from shoal.arguments import check, one_of
 from shoal.error_budget import ErrorBudget
 from shoal.errors import ComputationError, InputError
+from shoal.mechanics.affine import points
 from shoal.mechanics.analysis import left_out
 from shoal.mechanics.analysis.at_rest import at_start
 from shoal.mechanics.analysis.balance import BALANCED, Balance
 from shoal.mechanics.analysis.damped import small
 from shoal.mechanics.analysis.equilibrium import Equilibrium
-from shoal.mechanics.analysis.evaluate import Evaluator, points
+from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.analysis.going_on import as_stated
 from shoal.mechanics.analysis.singular import crossing
 from shoal.mechanics.analysis.small_motions import hides, pull

@@ -15,11 +15,12 @@ import scipy.linalg
 
 from shoal.arguments import check
 from shoal.mechanics import plane
+from shoal.mechanics.affine import points
 from shoal.mechanics.analysis import left_out
 from shoal.mechanics.analysis.balance import BALANCED, FALLS, Balance, View
 from shoal.mechanics.analysis.damped import small
 from shoal.mechanics.analysis.equilibrium import Equilibrium, Held
-from shoal.mechanics.analysis.evaluate import Evaluator, points
+from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.analysis.going_on import as_stated
 from shoal.mechanics.analysis.idle_spins import idle_spins
 from shoal.mechanics.analysis.joint_reactions import reactions_of

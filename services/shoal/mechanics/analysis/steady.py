@@ -24,8 +24,9 @@ import scipy.sparse
 from shoal.errors import ComputationError
 from shoal.mechanics import plane
 from shoal.mechanics import rotation as turns
+from shoal.mechanics.affine import points
 from shoal.mechanics.analysis.balance import BALANCED, CLOSE, STALLED, STRAINED
-from shoal.mechanics.analysis.evaluate import Evaluator, points
+from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.analysis.freedom import Freedom, Metric
 from shoal.mechanics.analysis.small_motions import ROUND, BoundedMatrix
 from shoal.mechanics.assembly.coordinates import Placement

@@ -49,13 +49,14 @@ def levenberg_marquardt(
     close: float = 0.0,
     round_off: float = 0.0,
     most: int,
-    project: Callable[[Array], Array] = np.asarray,
+    move: Callable[[Array, Array], Array] = np.add,
 ) -> Minima:
     """Minimise the sums of squared residuals from points, (searches, unknowns), each on its own.
 
     gain: part of the sum of squares below which a promised reduction ends a search; close: norm of the residual that
     needs no further step; round_off: norm below which a step that does not halve it is the last; most: iterations;
-    project: moves points back to where they may be
+    move: takes steps from points, also where these
+    are no vectors or have to stay within bounds
     """
     points, every = points.copy(), np.arange(len(points))
     residuals, jacobians = evaluate(points, every)
@@ -69,7 +70,7 @@ def levenberg_marquardt(
         active, step = active[hopeful], step[hopeful]
         if not active.size:
             break
-        trial = project(points[active] + step)
+        trial = move(points[active], step)
         residual, jacobian = evaluate(trial, active)
         norm, before = np.linalg.norm(residual, axis=1), norms[active]
         better = norm < before

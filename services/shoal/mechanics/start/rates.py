@@ -39,7 +39,7 @@ class Moving(NamedTuple):
 
 
 class Velocities:
-    """The search for the rates at given poses (lanes, 3 bodies)."""
+    """The search for the rates at given poses in the plane, (lanes, 3 bodies)."""
 
     def __init__(self, assembly: Assembly, poses: Array) -> None:
         self.scene, self.lanes, self.poses = assembly.scene, assembly.lanes, poses

@@ -61,7 +61,7 @@ def complete(scene: Scene) -> Start:
         if not gives_numbers(scene):
             placed = placed._replace(ok=np.ones_like(placed.ok))
     if not count and not placed.ok[0]:
-        raise _pose_refused(assembly)
+        raise pose_refused(assembly)
     velocities = Velocities(assembly, placed.poses)
     moving = velocities.run()
     if not count and not moving.ok[0]:
@@ -122,10 +122,9 @@ def is_direct(scene: Scene) -> bool:
     return len(set(placed)) == len(placed)
 
 
-def _pose_refused(assembly: Assembly) -> InputError:
+def pose_refused(assembly: Assembly) -> InputError:
     """Return an error that names the stated poses in contradiction, or the joint that cannot be closed at all."""
-    none = np.zeros_like(assembly.guess, dtype=bool)
-    if not assembly.seek(none, np.zeros_like(assembly.guess)).ok[0]:
+    if not assembly.seek([]).ok[0]:
         name, gap, _ = _gape(assembly, [])
         return InputError(f"joints.{name}: cannot be assembled; its places stay {gap} apart at best")
     guilty, fewest = _narrowed(assembly, [one for one in assembly.statements if one.firm])
@@ -168,9 +167,9 @@ def _narrowed(assembly: Assembly, guilty: list[Statement]) -> tuple[list[Stateme
 
 def _held_open(assembly: Assembly, chosen: list[Statement]) -> tuple[Array, Rows]:
     """Return weights of the rows, and the rows of least gaps in joints that close loops, with statements kept."""
-    fixed, values = assembly.held(chosen)
+    fixed, begin = assembly.held(chosen)
     weight = np.where(np.isin(assembly.closure.rows(assembly.guess).names, assembly.walk.closing), 1.0, 1e3)
-    u, _ = assembly.close(assembly.closure, np.where(fixed, values, assembly.guess), fixed, weight)
+    u, _ = assembly.close(assembly.closure, begin, fixed, weight)
     return weight, assembly.closure.rows(u)
 
 
