@@ -93,7 +93,7 @@ def test_searches_do_not_depend_on_each_other_and_keep_to_where_they_may_be() ->
     def fit(starts: Array) -> Array:
         return levenberg_marquardt(
             lambda x, _: (rosenbrock(x), slopes(x)), damped, starts, gain=1e-6, close=1e-14, most=200,
-            project=lambda x: np.clip(x, -2.0, 0.5),
+            move=lambda x, step: np.clip(x + step, -2.0, 0.5),
         ).points  # fmt: skip
 
     together = fit(starts)
