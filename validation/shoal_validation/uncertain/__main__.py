@@ -3,9 +3,9 @@
 
 Prints accuracy by number of runs of every method for intervals on every problem (`methods`), N random studies of
 machines in closed form by `auto`, whose bounds 100 000 random runs try to leave (`studies`), and ten scenes of other
-shapes whose bounds a fiftieth of these runs try (`scenes`), what must be reached and is (`reached`), and draws how far
-ahead every method tells bounds (`map`); writes all into FILE (docs/uncertain-charts.md). Two hours; quick: 20 studies of at
-most three parameters, the problems of one, demands of few seconds, and a map of up to two.
+shapes whose bounds a fiftieth of these runs try (`scenes`), demands (`reached`), and draws how far ahead the bounds of
+every method are right (`map`); writes all into FILE (docs/uncertain-charts.md). Two hours; quick: 20 studies of at most
+three parameters, the problems of one, demands of few seconds, and a map of up to two.
 """
 
 from __future__ import annotations
