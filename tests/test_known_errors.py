@@ -461,3 +461,43 @@ def test_no_limit_is_called_kept_that_the_converged_beam_passes(seed: int) -> No
     for one, far in zip(found.limits, beyond, strict=True):
         assert not (one.kept and far > 0.0), (one.limit.text, far, one.errors)
         assert one.kept is not False or far > -0.2 * np.ptp(true), (one.limit.text, far, one.errors)
+
+
+ARCH: dict[str, Any] = {
+    "name": "arch",
+    "bodies": {
+        "bow": {
+            "kind": "rod",
+            "length": 1.0,
+            "height": 0.08,
+            "width": 0.02,
+            "density": 7850.0,
+            "youngs_modulus": 2e9,
+            "poisson_ratio": 0.3,
+            "curvature": [1.0],
+            "element": "ancf-cable",
+            "elements": 8,
+        }
+    },
+    "joints": {"wall": {"kind": "weld", "first": {"body": "ground", "point": [0, 0]}, "second": {"body": "bow"}}},
+    "initial": {"bow": {"angle": 0.0, "position": [0, 0]}},
+    "markers": {"tip": {"body": "bow", "point": "end"}},
+    "solver": {"duration": 0.1, "step": 1e-4},
+}
+
+
+def test_shear_that_a_curved_rod_neglects_is_known_by_its_size() -> None:
+    """A curved rod has no rigid counterpart. Judged by rods with shear and rotary inertia (simo-reissner)."""
+    scene, times = Scene.parse(ARCH), np.linspace(0.0, 0.1, 11)
+    stout = {"bodies.bow.element": "simo-reissner", "bodies.bow.elements": 16, "bodies.bow.quadrature": "full"}
+    slender, sheared = (
+        shoal.simulate(scene.with_values(values), times, verify=False)
+        for values in ({"bodies.bow.elements": 16}, stout)
+    )
+    true = slender.distance(sheared)
+    stated = shoal.simulate(scene, times).model["errors"]["by_source"]["theory"]
+    assert true > 1e-4
+    assert true / 2 < stated < 3 * true
+    chosen = shoal.select(scene.with_values({"solver.theory": "slender"}), true / 4, times)
+    assert not chosen.met
+    assert chosen.shear == pytest.approx(stated, rel=0.1)

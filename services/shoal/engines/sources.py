@@ -180,8 +180,9 @@ def of_mesh(seen: Examined) -> tuple[list[Deviation] | None, str]:
 
 
 def of_theory(seen: Examined) -> tuple[list[Deviation] | None, str]:
-    """Estimate what slender rods leave out, see `theory`; nothing where that is not known."""
-    return theory_deviations(seen.run, seen.scene, seen.native) or [], ""
+    """Estimate what slender rods leave out; see `theory`."""
+    found = theory_deviations(seen.run, seen.scene, seen.native)
+    return found, "" if found is not None else "theory error not estimated: no run with shear can be believed"
 
 
 def of_friction(seen: Examined) -> tuple[list[Deviation] | None, str]:
