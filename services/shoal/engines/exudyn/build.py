@@ -58,7 +58,7 @@ def silence(exu: Any) -> Iterator[None]:
 
 
 @dataclass(frozen=True)
-class Machine:
+class ExudynSystem:
     """An assembled system and the parts that read its coordinates."""
 
     scene: Scene
@@ -124,7 +124,9 @@ class Machine:
         return np.asarray(sum((part.damping(q, v) for part in self.parts.values()), power))
 
 
-def build(exu: Any, scene: Scene, beam: Beam, end: float | None = None, system_of: type[System] = System) -> Machine:
+def build(
+    exu: Any, scene: Scene, beam: Beam, end: float | None = None, system_of: type[System] = System
+) -> ExudynSystem:
     """Enter bodies, gravity, joints and loads at the initial state. Raises InputError for a joint that is open.
 
     end [s]: of the run, beyond the scene's duration if at all; system_of: what the items are entered into.
@@ -155,4 +157,4 @@ def build(exu: Any, scene: Scene, beam: Beam, end: float | None = None, system_o
     exchanges += [add_load(ends, name, load) for name, load in scene.loads.items()]
     mbs.Assemble()
     reference = mbs.systemData.GetODE2Coordinates(configuration=exu.ConfigurationType.Reference)
-    return Machine(scene, system, mbs, container, clock, parts, gaps, exchanges, span(scene), np.array(reference))
+    return ExudynSystem(scene, system, mbs, container, clock, parts, gaps, exchanges, span(scene), np.array(reference))

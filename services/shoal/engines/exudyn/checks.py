@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shoal.engines.exudyn.build import Machine
+from shoal.engines.exudyn.build import ExudynSystem
 from shoal.engines.exudyn.record import Indices, KeptStates
 from shoal.mechanics.reach import MARGIN, distance_to_ground, reach
 from shoal.mechanics.start.rigid_bodies import lead
@@ -36,7 +36,7 @@ class RunCheck:
     gap: float
 
 
-def judge(machine: Machine, record: KeptStates, failure: str) -> RunCheck:
+def judge(machine: ExudynSystem, record: KeptStates, failure: str) -> RunCheck:
     """Read the markers and check the run; `failure` is what the solver said, empty where it was content."""
     points, angles, velocities, rates = _markers(machine, record)
     rows = np.unique(np.linspace(0, len(record.q) - 1, INSTANTS).astype(int))
@@ -64,7 +64,7 @@ def judge(machine: Machine, record: KeptStates, failure: str) -> RunCheck:
     return RunCheck(points, angles, velocities, rates, status, message, drift, gap)
 
 
-def _markers(machine: Machine, record: KeptStates) -> tuple[Array, Array, Array | None, Array | None]:
+def _markers(machine: ExudynSystem, record: KeptStates) -> tuple[Array, Array, Array | None, Array | None]:
     """Points, angles, velocities and rates; the last two in the plane."""
     scene, samples = machine.scene, record.at_wanted()
     angles, motions = [], []
@@ -87,7 +87,7 @@ def _turns(angle: Array) -> Array:
     return 2 * np.pi * np.round(angle / (2 * np.pi))
 
 
-def _energy_drift(machine: Machine, record: KeptStates, rows: Indices, energy: Array, moving: Array) -> float:
+def _energy_drift(machine: ExudynSystem, record: KeptStates, rows: Indices, energy: Array, moving: Array) -> float:
     # Where a load jumps, steps begin on its right side and end on its left.
     sides = (record.times, np.nextafter(record.times, 0.0))
     right, left = (machine.lost_power(side, record.q, record.v) for side in sides)

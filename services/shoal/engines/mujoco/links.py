@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from shoal.engines.tree.scene import Begin
+from shoal.engines.tree.scene import BodyStart
 from shoal.scene import GROUND, Attachment, Distance, PointMass, Revolute, Scene, Slider, Spherical, Weld
 from shoal.scene.dimensions import padded
 from shoal.scene.joints import Cylindrical, Planar, Universal
@@ -36,7 +36,7 @@ class LinkTree:
     begin: how each body begins; axis: of a joint at one of its places, from there and what the scene states of it
     """
 
-    def __init__(self, scene: Scene, begin: Mapping[str, Begin], axis: Callable[..., Array]) -> None:
+    def __init__(self, scene: Scene, begin: Mapping[str, BodyStart], axis: Callable[..., Array]) -> None:
         self._scene, self._begin, self._axis = scene, begin, axis
 
     def links(self) -> Iterator[TreeLink]:
@@ -131,6 +131,6 @@ def local(scene: Scene, at: Attachment) -> Array:
     return np.array([float(x) for x in padded(place, 3)])
 
 
-def where(scene: Scene, begin: Mapping[str, Begin], at: Attachment) -> Array:
+def where(scene: Scene, begin: Mapping[str, BodyStart], at: Attachment) -> Array:
     """A place at the start [m], (3,)."""
     return begin[at.body].point(local(scene, at))

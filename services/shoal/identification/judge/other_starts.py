@@ -58,7 +58,7 @@ def turned(model: ForwardModel, point: Array) -> Iterator[Array]:
     if turn is None:
         return
     for name in model.measurement.recordings:
-        start = _Start(model, point, name)
+        start = _ReachableStart(model, point, name)
         # What turns together, and about which axis.
         together = tuple(start.turning)
         axes = [(body, axis) for body in together for axis in start.axes(body)]
@@ -72,7 +72,7 @@ def turned(model: ForwardModel, point: Array) -> Iterator[Array]:
 
 def mirrored(model: ForwardModel, point: Array, name: str) -> Iterator[Array]:
     """Mirror images of a machine in space, and half turns of it, in a recording, within the bounds."""
-    start = _Start(model, point, name)
+    start = _ReachableStart(model, point, name)
     if start.scene.dimensions != 3:
         return
     bodies = [body for body in start.scene.initial if start.sought_of(body)]
@@ -92,7 +92,7 @@ def mirrored(model: ForwardModel, point: Array, name: str) -> Iterator[Array]:
 
 
 @dataclass(frozen=True)
-class _Start:
+class _ReachableStart:
     """The start of a machine in a recording at a point (parameters,)."""
 
     model: ForwardModel

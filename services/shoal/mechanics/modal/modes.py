@@ -33,7 +33,7 @@ Shapes = Callable[[tuple[Number, ...]], tuple[list[Any], list[Any]]]
 
 
 @dataclass(frozen=True)
-class Modes:
+class ModalIntegrals:
     """across: how many have a vector of their own; along: how many of a rod stretch it, first evenly.
 
     moments: Hermitian, (2 + across, 2 + across, lanes), the first two of the frame; stiffness, damping: (modes, modes,
@@ -50,12 +50,12 @@ class Modes:
     shapes: Shapes
 
 
-def modes_of(scene: Scene, name: str) -> Modes:
+def modes_of(scene: Scene, name: str) -> ModalIntegrals:
     """The modes of a modal rod or body."""
     body = scene.bodies[name]
     if isinstance(body, ModalBody):
         stiffness, damping = body.matrix("modal_stiffness"), body.matrix("modal_damping")
-        return Modes(len(body.modes), 0, 1.0, body.moments, stiffness, damping, _shapes_of_body(name, body))
+        return ModalIntegrals(len(body.modes), 0, 1.0, body.moments, stiffness, damping, _shapes_of_body(name, body))
     assert isinstance(body, Rod)
     return _of_rod(body, held(scene, name))
 
@@ -110,7 +110,7 @@ def bent(scene: Scene, name: str, place: tuple[Number, ...]) -> tuple[Number, Nu
     return along, rate, np.angle(way), np.imag(turning / way)
 
 
-def _of_rod(rod: Rod, ends: Ends) -> Modes:
+def _of_rod(rod: Rod, ends: Ends) -> ModalIntegrals:
     """The integrals of the shapes of a uniform beam over a rod, which may be tapered."""
     x, weight = np.polynomial.legendre.leggauss(_POINTS + 8 * (rod.modes + rod.axial_modes))
     x, weight = (x[:, None] + 1) / 2, weight[:, None] / 2
@@ -128,7 +128,7 @@ def _of_rod(rod: Rod, ends: Ends) -> Modes:
     stiffness = _cleaned(stiffness)
     damping = np.asarray(rod.retardation) * stiffness
     shapes = _shapes_of_rod(rod, ends)
-    return Modes(rod.modes, rod.axial_modes, rod.length, _cleaned(moments), stiffness, damping, shapes)
+    return ModalIntegrals(rod.modes, rod.axial_modes, rod.length, _cleaned(moments), stiffness, damping, shapes)
 
 
 def _laned(fields: Any) -> Array:

@@ -10,7 +10,7 @@ import numpy as np
 from shoal.engines.capabilities import loops
 from shoal.engines.course import Clock
 from shoal.engines.exudyn.bodies import System
-from shoal.engines.exudyn.build import Beam, Machine, silence
+from shoal.engines.exudyn.build import Beam, ExudynSystem, silence
 from shoal.engines.exudyn.ground import drive, driven
 from shoal.engines.exudyn.space.beam import SpatialBeamPart
 from shoal.engines.exudyn.space.bodies import SolidPart, SpatialCablePart, SpatialGround
@@ -32,7 +32,7 @@ DEPENDENT = 1e-9
 
 def build_in_space(
     exu: Any, scene: Scene, beam: Beam, end: float | None = None, system_of: type[System] = System
-) -> Machine:
+) -> ExudynSystem:
     """Enter bodies, gravity, joints and loads at the initial state. Raises InputError.
 
     beam, end, system_of: as of `build`
@@ -77,7 +77,7 @@ def build_in_space(
     reference = mbs.systemData.GetODE2Coordinates(configuration=exu.ConfigurationType.Reference)
     started = scene.model_copy(update={"initial": begun(placement.frames, scene, q, v)})
     dependent = _dependent(exu, mbs) if any(loops(scene)) else 0
-    return Machine(
+    return ExudynSystem(
         started, system, mbs, container, clock, parts, gaps, exchanges, span(scene), np.array(reference), dependent
     )
 

@@ -115,7 +115,7 @@ def suspects(
     misfit: whether the residual is more than noise; else only what a score test finds is fitted
     Past the model's deadline it ends with what was found until then.
     """
-    search = _Search(model, point, residual, jacobian, noise, test or ScoreTest.of(model, residual, jacobian))
+    search = _FaultSearch(model, point, residual, jacobian, noise, test or ScoreTest.of(model, residual, jacobian))
     cut = True
     with suppress(TimeIsUp):
         search.run(misfit)
@@ -130,7 +130,7 @@ def suspects(
     return FaultSearch(named, refits, search.better, cut, search.hypotheses)
 
 
-class _Search:
+class _FaultSearch:
     """One search, whose finds stay when its time is up."""
 
     def __init__(

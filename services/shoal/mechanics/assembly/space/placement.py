@@ -140,7 +140,7 @@ def _place_rigid(name: str, mine: list[JointPoint], pose: Pose, result: SpatialP
     others = [point for point in mine if point is not anchor]
     if root not in kept.directors:
         hinge = next((axis for axis in axes if axis.where is not None and not axis.where.terms), None)
-        body = _Rigid(name, pose, where, p, result)
+        body = _DirectorVectors(name, pose, where, p, result)
         own = body.free(axes, others) if hinge is None else body.hinged(hinge, others)
         kept.directors[root] = rotated(own, transposed(relative))
     directors = kept.of_body(name)
@@ -159,7 +159,7 @@ def _place_rigid(name: str, mine: list[JointPoint], pose: Pose, result: SpatialP
         axis.holders.add(name)
 
 
-class _Rigid:
+class _DirectorVectors:
     """The directors of one body from vectors that it shares or makes."""
 
     def __init__(self, name: str, pose: Pose, where: Affine, p: Place, result: SpatialPlacement) -> None:
