@@ -40,7 +40,7 @@ _EMPTY = ("", "nan", "na", "n/a", "null", "none", "<na>", "nat")
 
 
 @dataclass(frozen=True)
-class ColumnTable:
+class Table:
     """Columns as a file has them, by name.
 
     rows: the line of the file that each row stands on, (rows,); decimal: how its text writes the decimal mark
@@ -87,7 +87,7 @@ class ColumnTable:
             raise InputError(f"{self.path}: row {self.rows[k]}, column {column!r}: {_short(found)} {why}")
 
 
-def load_table(path: Path, columns: list[str] | None = None, *, largest: int | None = None) -> ColumnTable:
+def load_table(path: Path, columns: list[str] | None = None, *, largest: int | None = None) -> Table:
     """A table of CSV or Parquet; columns: names, where it has no header line. Raises InputError.
 
     largest: bytes, unpacked; LARGEST if not stated
@@ -126,7 +126,7 @@ def _utf8(path: Path, data: bytes) -> bytes:
     return data
 
 
-def _parquet(path: Path, data: bytes, largest: int) -> ColumnTable:
+def _parquet(path: Path, data: bytes, largest: int) -> Table:
     import pandas
 
     try:
@@ -142,10 +142,10 @@ def _parquet(path: Path, data: bytes, largest: int) -> ColumnTable:
         raise InputError(f"data: {path} is Parquet, which needs the package pyarrow; install it, or give CSV") from None
     except (OSError, ValueError, KeyError, NotImplementedError, MemoryError) as error:
         raise InputError(f"data: {path} is not Parquet: {_short(str(error))}") from None
-    return ColumnTable(path, frame, np.arange(1, len(frame) + 1))
+    return Table(path, frame, np.arange(1, len(frame) + 1))
 
 
-def _csv(path: Path, data: bytes, columns: list[str] | None) -> ColumnTable:
+def _csv(path: Path, data: bytes, columns: list[str] | None) -> Table:
     import pandas
 
     if b"\n" not in data:
@@ -191,7 +191,7 @@ def _csv(path: Path, data: bytes, columns: list[str] | None) -> ColumnTable:
     filled = frame.notna().any(axis=1).to_numpy()
     cells = next(csv.reader([head.units], delimiter=separator), [])
     units = of_columns(path, head.unit_row, names, cells) if head.units else None
-    return ColumnTable(path, frame[filled], rows[filled], decimal, comments, units)
+    return Table(path, frame[filled], rows[filled], decimal, comments, units)
 
 
 def _without_preamble(data: bytes) -> bytes:

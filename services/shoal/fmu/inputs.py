@@ -17,7 +17,7 @@ HELD = "scale", "torque"
 
 
 @dataclass
-class InputSignals:
+class Inputs:
     """Values by path, from time zero on.
 
     A load's is held from one communication point to the next. A prescribed position goes straight to its value and is

@@ -1,7 +1,7 @@
-"""Stability limit of explicit integrators: the largest step, from the highest frequency and decay rate of the machine.
+"""The largest step an explicit integrator may take, from the highest frequency of the scene.
 
-They are those of the equations linearised at the initial state (Hughes, The Finite Element Method, 2000, section
-9.1), without the constraints, which can only lower them (Rayleigh's interlacing theorem).
+The frequency is that of the linearised system at the initial state, without the constraints (which
+can only lower it: Rayleigh's interlacing).
 """
 
 from __future__ import annotations
@@ -17,9 +17,10 @@ from shoal.mechanics.numerics.tile import Array, pack, tiles, unpack
 from shoal.mechanics.tangent import damping_at, stiffness_at, tangent_tile
 
 _DENSE = 200
-"""Unknowns up to which the dense eigenproblem is solved, as the import of Lanczos's method takes longer."""
+"""Up to so many unknowns the dense eigenproblem is the faster one, as Lanczos's method has to be imported first."""
 _ACCURACY = 1e-6
-"""Relative error of an eigenvalue by Lanczos's method: along the motion it changes by more."""
+"""Relative, of an eigenvalue by Lanczos's method, whose last digits are no better known along the motion."""
+
 _SAME = 1e-5
 """Relative difference of the matrices of two lanes that count as one."""
 
@@ -64,7 +65,7 @@ def _largest_eigenvalue(model: Model, damping: bool) -> float:
 
 
 def _different(matrix: Array, mass: Array) -> list[int]:
-    """Return one lane of each group with nearly equal matrices, as those of finite differences are."""
+    """The lanes without those that are another one's neighbours, as those of finite differences are."""
     both = np.concatenate(
         [matrix / np.max(np.abs(matrix), initial=1e-300), mass / np.max(np.abs(mass), initial=1e-300)]
     )

@@ -85,7 +85,7 @@ def _multiples(times: Array, interval: float) -> bool:
 
 
 @dataclass
-class KeptStates:
+class Record:
     """Coordinates and velocities at the kept steps, (kept, unknowns); not a number where the run did not get."""
 
     steps: Steps

@@ -24,14 +24,12 @@ import scipy.sparse
 from shoal.errors import ComputationError
 from shoal.mechanics import plane
 from shoal.mechanics import rotation as turns
-from shoal.mechanics.affine import points
 from shoal.mechanics.analysis.balance import BALANCED, CLOSE, STALLED, STRAINED
-from shoal.mechanics.analysis.evaluate import Evaluator
+from shoal.mechanics.analysis.evaluate import Evaluator, points
 from shoal.mechanics.analysis.freedom import Freedom, Metric
-from shoal.mechanics.analysis.small_motions import ROUND, BoundedMatrix
+from shoal.mechanics.analysis.small_motions import ROUND, Tangent
 from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.frames import BeamFrame, ModalFrame, RigidFrame
-from shoal.mechanics.numerics.newton import newton
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
 from shoal.scene import Scene
@@ -220,7 +218,7 @@ class Steady:
         multipliers = freedom.multipliers(force)
         loose = self.evaluator.stiffness(q, t)
         full = self.evaluator.stiffness(q, t, multipliers=multipliers)
-        stiffness = BoundedMatrix(full.toarray(), (ROUND * (abs(loose) + abs(full - loose))).toarray())
+        stiffness = Tangent(full.toarray(), (ROUND * (abs(loose) + abs(full - loose))).toarray())
         damping = self.evaluator.damping(q, v).toarray()
         return Seen(
             evaluation.jacobian.toarray(), freedom, freedom.basis.T @ force, evaluation.gap, stiffness, damping,
@@ -241,18 +239,18 @@ class Steady:
         turned = moved[:n, :n]
         return turned, turned @ self.q + moved[:n, n], turned @ self.v
 
-    def stiffness(self, seen: Seen) -> BoundedMatrix:
+    def stiffness(self, seen: Seen) -> Tangent:
         """Stiffness of small motions in the moving frame, with the centrifugal one and that of forces of rates."""
         inertial = self.evaluator.mass @ self.matrix @ self.matrix
         friction = self._by_rates(seen)
         matrix = seen.stiffness.matrix + inertial - friction
         bound = seen.stiffness.bound + EXACT * (abs(inertial) + abs(friction))
-        return BoundedMatrix(np.asarray(matrix), np.asarray(bound))
+        return Tangent(np.asarray(matrix), np.asarray(bound))
 
-    def gyroscopic(self, seen: Seen) -> BoundedMatrix:
+    def gyroscopic(self, seen: Seen) -> Tangent:
         """Damping and gyroscopic matrix of small motions in the moving frame."""
         coriolis = 2.0 * (self.evaluator.mass @ self.matrix)
-        return BoundedMatrix(seen.damping + coriolis, ROUND * abs(seen.damping) + EXACT * abs(coriolis))
+        return Tangent(seen.damping + coriolis, ROUND * abs(seen.damping) + EXACT * abs(coriolis))
 
     def _by_rates(self, seen: Seen) -> Array:
         """Derivative along the free directions of the forces that the rates X(q) make."""
@@ -278,7 +276,7 @@ class Seen(NamedTuple):
     freedom: Freedom
     unbalanced: Array
     gap: Array
-    stiffness: BoundedMatrix
+    stiffness: Tangent
     damping: Array
     size: float
 
@@ -387,7 +385,7 @@ def _checked(
     weights = _constant(twists, begun, seen, weights, idle)
     found = _steady(begun.scene, begun.evaluator, begun.metric, twists, weights, begun.q, begun.t)
     if seek:
-        sought = _near_start(found, twists, size)
+        sought = _sought(found, twists, size)
         if sought is None:
             raise _refused(begun, twists, v, size)
         found = sought
@@ -498,15 +496,14 @@ def _state(steady: Steady, s: float) -> tuple[Array, Array, Array, float]:
     return q, v, steady.matrix @ v, steady.t + s
 
 
-def _near_start(begun: Steady, twists: Twists, size: float) -> Steady | None:
+def _sought(begun: Steady, twists: Twists, size: float) -> Steady | None:
     """The steady motion of the same field near the start, by Newton's method; None where there is none."""
     mass = sum(float(body.mass) for body in begun.scene.bodies.values())
-    unit = size * np.sqrt(mass)
-
-    def correct(found: Steady) -> tuple[Array, float]:
+    found, unit, last = begun, size * np.sqrt(mass), np.inf
+    for _ in range(MOST):
         seen = found.here()
         if np.linalg.norm(seen.unbalanced) <= ROUND * seen.size and np.max(np.abs(seen.gap), initial=0.0) < CLOSE:
-            return np.zeros_like(found.q), 0.0
+            return found
         scaled = _Scaled(found, seen)
         matrix = scaled.stiffness(found.stiffness(seen).matrix)
         back = seen.freedom.shift(-seen.gap)
@@ -514,23 +511,17 @@ def _near_start(begun: Steady, twists: Twists, size: float) -> Steady | None:
         left, sizes, ways = np.linalg.svd(matrix)
         rank = int(np.sum(sizes > LOOSE))
         y = scaled.weight * (ways[:rank].T @ (left[:, :rank].T @ right / sizes[:rank]))
-        correction = back + scaled.modes @ y
-        is_near = way(found.q + correction) < NEAR * size
-        unmet = float(np.linalg.norm(y)) / unit + float(np.max(np.abs(back), initial=0.0))
-        return correction, unmet if is_near else np.inf
-
-    def way(q: Array) -> float:
-        return float(twists.fastest(q - begun.q, size)[0])
-
-    def move(found: Steady, correction: Array) -> Steady:
-        q = found.q + correction
-        return replace(found, q=q, v=found.matrix @ q + found.constant, moved=way(q))
-
-    found, converged, *_ = newton(correct, begun, close=CLOSE, round_off=STALLED, most=MOST, move=move)
-    if not converged:
-        return None
-    seen = found.here()
-    return found if np.linalg.norm(seen.unbalanced) <= BALANCED * max(seen.size, 1e-300) else None
+        q = found.q + back + scaled.modes @ y
+        moved, _ = twists.fastest(q - begun.q, size)
+        if not moved < NEAR * size:
+            return None
+        found = replace(found, q=q, v=found.matrix @ q + found.constant, moved=moved)
+        correction = float(np.linalg.norm(y)) / unit + float(np.max(np.abs(back), initial=0.0))
+        if correction < CLOSE or (correction < STALLED and correction > 0.3 * last):
+            seen = found.here()
+            return found if np.linalg.norm(seen.unbalanced) <= BALANCED * max(seen.size, 1e-300) else None
+        last = correction
+    return None
 
 
 def _compare(found: Steady) -> tuple[float, str]:
