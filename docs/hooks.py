@@ -1,15 +1,37 @@
-"""What the site generates from the program itself: the help of every command."""
+"""What the site generates from the program itself: commands, findings, fields of scenes."""
 
 from __future__ import annotations
 
-from typing import Any
+import ast
+import inspect
+import re
+import textwrap
+from collections.abc import Iterator
+from typing import Any, Literal, get_args, get_origin
 
 import click
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
 
 
 def on_page_markdown(markdown: str, **_: Any) -> str:
-    """Put the commands where a page has the mark for them."""
-    return markdown.replace("<!-- commands -->", commands()) if "<!-- commands -->" in markdown else markdown
+    """Put what is generated where a page has the mark for it."""
+    marks = {"<!-- commands -->": commands, "<!-- findings -->": findings, "<!-- scene fields -->": scene_fields}
+    for mark, generate in marks.items():
+        markdown = markdown.replace(mark, generate()) if mark in markdown else markdown
+    return markdown
+
+
+def findings() -> str:
+    """The table of all kinds of findings of an identification."""
+    from shoal.findings import Kind
+    from shoal.identification import findings as kinds
+
+    rows = ["| code | severity | meaning | verdict | what to do |", "|---|---|---|---|---|"]
+    for one in vars(kinds).values():
+        if isinstance(one, Kind):
+            rows.append(f"| `{one.code}` | {one.severity} | {one.meaning} | {one.implies} | {one.remedy} |")
+    return "\n".join(rows)
 
 
 def commands() -> str:
@@ -24,3 +46,118 @@ def commands() -> str:
             help_text = command.get_help(click.Context(command, info_name=name, parent=root))
             parts.append(f"## shoal {name}\n\n```text\n{help_text}\n```\n")
     return "\n".join(parts)
+
+
+def scene_fields() -> str:
+    """The tables of the fields of every model that a scene is made of."""
+    from shoal.scene import Scene
+
+    return "\n".join(map(_table, models(Scene)))
+
+
+def models(kind: Any) -> list[type[BaseModel]]:
+    """The pydantic models that a type is made of, each once, in the order in which they occur."""
+    found: dict[type[BaseModel], None] = {}
+
+    def visit(part: Any) -> None:
+        if isinstance(part, type) and issubclass(part, BaseModel) and part not in found:
+            found[part] = None
+            for field in part.model_fields.values():
+                visit(field.annotation)
+        for inner in get_args(part):
+            visit(inner)
+
+    visit(kind)
+    return list(found)
+
+
+def meanings(model: type[BaseModel]) -> dict[str, str]:
+    """The docstrings of a model's fields, its own and inherited; these follow the field (PEP 257)."""
+    found = {}
+    for base in reversed(model.__mro__):
+        if issubclass(base, BaseModel) and base.model_fields:
+            (body,) = ast.parse(textwrap.dedent(inspect.getsource(base))).body
+            assert isinstance(body, ast.ClassDef)
+            for field, after in zip(body.body, body.body[1:], strict=False):
+                match field, after:
+                    case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(text))):
+                        found[name] = " ".join(text.split())
+    return found
+
+
+def fields(model: type[BaseModel]) -> dict[str, FieldInfo]:
+    """The fields of a model that a user may choose: without `kind` and others of one value alone."""
+    return {
+        name: field
+        for name, field in model.model_fields.items()
+        if len(get_args(field.annotation)) != 1 or get_origin(field.annotation) is not Literal
+    }
+
+
+def has_number(annotation: Any) -> bool:
+    """Return whether a type is a float, or has one among its parts that belong to no other model."""
+    return annotation is float or any(map(has_number, get_args(annotation)))
+
+
+def _table(model: type[BaseModel]) -> str:
+    kind = model.model_fields.get("kind")
+    title = f"`kind: {kind.default}`" if kind else model.__name__
+    said = meanings(model)
+    head = [
+        f"## {title}",
+        "",
+        inspect.getdoc(model) or "",
+        "",
+        "| field | type | default | meaning |",
+        "|---|---|---|---|",
+    ]
+    rows = [
+        f"| `{name}` | {_type(field)} | {_default(field)} | {said.get(name, '')} |"
+        for name, field in fields(model).items()
+    ]
+    return "\n".join([*head, *rows, ""]) if rows else "\n".join(head[:3]) + "\n"
+
+
+_WORDS = {float: "number", int: "whole number", str: "text", bool: "true or false", type(None): ""}
+_SIGNS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
+
+
+def _type(field: FieldInfo) -> str:
+    """The type and the allowed range of a field."""
+    return _written(field.annotation, field.metadata)
+
+
+def _written(kind: Any, metadata: Any = ()) -> str:
+    if hasattr(kind, "__metadata__"):  # Annotated
+        return _written(get_args(kind)[0], kind.__metadata__)
+    bounds = [one for part in metadata for one in getattr(part, "metadata", [part])]
+    limits = [f"{sign} {getattr(one, name):g}" for one in bounds for name, sign in _SIGNS.items() if hasattr(one, name)]
+    origin, parts = get_origin(kind), get_args(kind)
+    if origin is Literal:
+        text = ", ".join(f"`{one}`" for one in parts)
+    elif origin is tuple:
+        count = "" if parts[-1] is ... else f"{len(parts)} "
+        text = f"list of {count}{_written(parts[0]).replace('number', 'numbers', 1)}"
+    elif origin is dict:
+        text = "by name: " + _written(parts[1])
+    elif parts:
+        text = " or ".join(dict.fromkeys(filter(None, map(_written, parts))))
+    elif isinstance(kind, type) and issubclass(kind, BaseModel):
+        named = kind.model_fields.get("kind")
+        text = f"`{named.default}`" if named else kind.__name__
+    else:
+        text = _WORDS.get(kind, str(getattr(kind, "__name__", kind)))
+    return " ".join([text, *limits])
+
+
+def _default(field: FieldInfo) -> str:
+    """The default of a field as YAML writes it."""
+    value = field.default
+    if field.is_required():
+        return "required"
+    if value is None or isinstance(value, BaseModel | dict) or value in ((), ""):
+        number = getattr(value, "number", None)
+        return "" if number is None else f"`{number:g}`"
+    if isinstance(value, tuple):
+        return f"`[{', '.join(f'{one:g}' for one in value)}]`"
+    return f"`{str(value).lower() if isinstance(value, bool) else value}`"

@@ -59,6 +59,23 @@ def test_every_file_and_heading_that_the_readme_names_is_there() -> None:
         assert not heading or heading in [re.sub(r"\W+", "-", title.lower()) for title in titles], (file, heading)
 
 
+def test_readme_fits_on_a_page_and_its_commands_run_as_printed() -> None:
+    text = (DOCS.parent / "README.md").read_text(encoding="utf-8")
+    assert len(text.splitlines()) <= 120
+    code = [
+        line
+        for _, block in re.findall(r"^```(bash)[^\n]*\n(.*?)^```", text, re.M | re.S)
+        for line in block.splitlines()
+    ]
+    commands = [shlex.split(line, comments=True) for line in code]
+    assert {words[0] for words in commands} == {"make", "source", "shoal"}
+    assert {words[1] for words in commands if words[0] == "shoal"} <= set(
+        main.list_commands(main.make_context("shoal", [], resilient_parsing=True))
+    )
+    # No word to be replaced, and no file that has not been written before.
+    assert not any(word.isupper() for words in commands for word in words[1:])
+
+
 def test_notebook_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     assert run("notebook.md")["estimate"].parameters["angle"].value == pytest.approx(0.3, abs=1e-6)

@@ -137,7 +137,7 @@ def test_a_comma_beside_points_is_no_decimal_mark(tmp_path: Path) -> None:
 
 def test_a_binary_table_without_a_line_feed_stays_as_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     data, seen = b"PAR1\r\r\rPAR1", []
-    empty = table.Table(tmp_path, None, np.zeros(0, np.intp))
+    empty = table.ColumnTable(tmp_path, None, np.zeros(0, np.intp))
     monkeypatch.setattr(table, "_parquet", lambda path, found, largest: seen.append(found) or empty)
     (tmp_path / "run.parquet").write_bytes(data)
     table.load_table(tmp_path / "run.parquet")

@@ -27,7 +27,7 @@ from shoal.scene.load import LARGEST, built_in_scenes, read_yaml, some, unknown
 from shoal.scene.measured import PARTS
 from shoal.scene.parametric import parametric
 from shoal.shelf import LARGEST as LARGEST_ENTRY
-from shoal.shelf import NAME, Entry, Files, check_name, check_paths, located, shelf
+from shoal.shelf import NAME, Files, StoredVersion, check_name, check_paths, located, shelf
 from shoal.table import load_table
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ Documents = dict[str, bytes]
 
 
 @dataclass(frozen=True)
-class Kind:
+class EntryKind:
     """A kind of entry of the library. folder: its name there; one: in words; check: of a document, raises InputError.
 
     mark: the field that only its documents have; built_in: names that are taken; references: how a document names
@@ -90,19 +90,19 @@ def _check_problem(document: Path) -> None:
 
 def _check_study(document: Path) -> None:
     study = load_study(str(document))
-    scene = study.machine()
+    scene, asked = study.machine(), study.asked()
     _model(scene)
     if any("empirical(" in text or is_source(text) for text in study.vary):
         raise InputError(f"{document.name}: {KEY}: vary: a file of observations cannot be kept with a study")
-    parameters(study.vary, scene)
-    read_limits(study.limit, study.require, scene)
+    parameters(asked["vary"], scene)
+    read_limits(asked["limits"], asked["requirements"], scene)
 
 
 KINDS = {
     kind.folder: kind
     for kind in (
-        Kind("recordings", "recording", _check_recording, "path", references={("path",): ""}),
-        Kind(
+        EntryKind("recordings", "recording", _check_recording, "path", references={("path",): ""}),
+        EntryKind(
             *("scenes", "scene", _check_scene, "bodies", lambda name: _scene_named(name)),
             references={
                 ("expect", "*", "path"): "recordings",
@@ -110,7 +110,7 @@ KINDS = {
                 **{(part, "*", "*", "path"): "" for part in PARTS},
             },
         ),
-        Kind(
+        EntryKind(
             *("problems", "problem", _check_problem, "parameters", lambda name: name in built_in_problems()),
             references={
                 ("scene",): "scenes",
@@ -118,7 +118,7 @@ KINDS = {
                 ("recordings", "*", "path"): "recordings",
             },
         ),
-        Kind(
+        EntryKind(
             *("studies", "study", _check_study, KEY, lambda name: name in built_in_studies()),
             references={(KEY, "scene"): "scenes"},
         ),
@@ -131,7 +131,7 @@ def _scene_named(name: str) -> bool:
     return name in built_in_scenes() or parametric(name) is not None
 
 
-def kind_of(given: str) -> Kind:
+def kind_of(given: str) -> EntryKind:
     """The kind of that name, in the singular or the plural. Raises InputError."""
     for kind in KINDS.values():
         if given in (kind.folder, kind.one):
@@ -139,12 +139,12 @@ def kind_of(given: str) -> Kind:
     raise InputError(f"kind: no kind {given!r}; there are {', '.join(kind.one for kind in KINDS.values())}")
 
 
-def entries(kind: str | None = None) -> list[Entry]:
+def entries(kind: str | None = None) -> list[StoredVersion]:
     """Everything in the library, or what is of a kind."""
     return [entry for folder in KINDS if kind in (None, folder) for entry in shelf().entries(folder)]
 
 
-def entry(name: str, kind: str | None = None) -> Entry:
+def entry(name: str, kind: str | None = None) -> StoredVersion:
     """The entry of that NAME or NAME@VERSION. Raises InputError."""
     found = [one for folder in KINDS if kind in (None, folder) and (one := shelf().find(folder, name)) is not None]
     if not found:
@@ -157,7 +157,7 @@ def entry(name: str, kind: str | None = None) -> Entry:
     return found[0]
 
 
-def about(entry: Entry) -> dict[str, Any]:
+def about(entry: StoredVersion) -> dict[str, Any]:
     """Return the summary of an entry for lists and services."""
     try:
         data = read_yaml(_text(_content(entry.document, LARGEST), entry.document), entry.name)
@@ -167,7 +167,7 @@ def about(entry: Entry) -> dict[str, Any]:
     return {"kind": entry.kind, "name": entry.name, "version": entry.version, "description": description}
 
 
-def add(file: str | Path, name: str | None = None, kind: str | None = None) -> Entry:
+def add(file: str | Path, name: str | None = None, kind: str | None = None) -> StoredVersion:
     """Check a scene, a problem or a recording (YAML, CSV or Parquet) and keep it with the files that it names.
 
     name: else that of the file; kind: else what its fields say. Raises InputError.
@@ -178,7 +178,7 @@ def add(file: str | Path, name: str | None = None, kind: str | None = None) -> E
     return put(wanted, name, gathered(wanted, str(path), name, whole=False))
 
 
-def put(kind: str, name: str, files: Files) -> Entry:
+def put(kind: str, name: str, files: Files) -> StoredVersion:
     """Keep files under a name if they are right; see `Shelf.put`. Raises InputError."""
     if KINDS[kind].built_in(check_name(name)):
         raise InputError(f"name: {name} is the name of a built-in {KINDS[kind].one}; choose another")
@@ -244,7 +244,7 @@ def _fits(more: Documents, files: Documents) -> bool:
     return all(files.get(path, content) == content for path, content in more.items())
 
 
-def _check(kind: Kind, document: Path) -> None:
+def _check(kind: EntryKind, document: Path) -> None:
     """Raises InputError, in which paths are those of the entry."""
     _check_paths(kind, document)
     try:
@@ -253,7 +253,7 @@ def _check(kind: Kind, document: Path) -> None:
         raise InputError(str(error).replace(f"{document.parent}/", "")) from None
 
 
-def _check_paths(kind: Kind, document: Path) -> None:
+def _check_paths(kind: EntryKind, document: Path) -> None:
     """Return whether a document names nothing but what is below it, and entries of the library. Raises InputError."""
     size = document.stat().st_size
     if size > LARGEST:

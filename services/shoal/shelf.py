@@ -36,7 +36,7 @@ _IDENTITY = ".identity"
 
 
 @dataclass(frozen=True)
-class Entry:
+class StoredVersion:
     """One version of a scene, a problem or another kind."""
 
     kind: str
@@ -64,7 +64,7 @@ class Shelf:
 
     root: Path
 
-    def find(self, kind: str, reference: str) -> Entry | None:
+    def find(self, kind: str, reference: str) -> StoredVersion | None:
         """The entry of that NAME, or NAME@VERSION; None if there is none, or a link leads out of the library."""
         name, _, version = reference.partition("@")
         if not NAME.fullmatch(name) or ("@" in reference and not VERSION.fullmatch(version)):
@@ -73,11 +73,11 @@ class Shelf:
         if not version:
             with suppress(OSError, UnicodeDecodeError):
                 version = (place / _CURRENT).read_text(encoding="utf-8").strip()
-        entry = Entry(kind, name, version, place / version)
+        entry = StoredVersion(kind, name, version, place / version)
         there = VERSION.fullmatch(version) and entry.document.is_file() and self._inside(entry.document)
         return entry if there else None
 
-    def entries(self, kind: str) -> list[Entry]:
+    def entries(self, kind: str) -> list[StoredVersion]:
         """The current version of every name, sorted."""
         try:
             names = sorted(os.listdir(self.root / kind))
@@ -108,7 +108,7 @@ class Shelf:
                     sizes += os.lstat(os.path.join(folder, name)).st_size
         return sizes
 
-    def put(self, kind: str, name: str, files: Files, check: Callable[[Path], None] = lambda _: None) -> Entry:
+    def put(self, kind: str, name: str, files: Files, check: Callable[[Path], None] = lambda _: None) -> StoredVersion:
         """Keep files under a name; versions that were there stay.
 
         check: is given the document before it is kept, and raises where it is wrong. Raises InputError.
@@ -121,7 +121,7 @@ class Shelf:
             with self._alone():
                 self._move(fresh, place / version)
                 _replace(place / _CURRENT, version.encode())
-        return Entry(kind, name, version, place / version)
+        return StoredVersion(kind, name, version, place / version)
 
     def remove(self, kind: str, name: str) -> None:
         """Forget a name with all its versions. Raises InputError."""

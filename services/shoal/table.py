@@ -40,7 +40,7 @@ _EMPTY = ("", "nan", "na", "n/a", "null", "none", "<na>", "nat")
 
 
 @dataclass(frozen=True)
-class Table:
+class ColumnTable:
     """Columns as a file has them, by name.
 
     rows: the line of the file that each row stands on, (rows,); decimal: how its text writes the decimal mark
@@ -87,7 +87,7 @@ class Table:
             raise InputError(f"{self.path}: row {self.rows[k]}, column {column!r}: {_short(found)} {why}")
 
 
-def load_table(path: Path, columns: list[str] | None = None, *, largest: int | None = None) -> Table:
+def load_table(path: Path, columns: list[str] | None = None, *, largest: int | None = None) -> ColumnTable:
     """A table of CSV or Parquet; columns: names, where it has no header line. Raises InputError.
 
     largest: bytes, unpacked; LARGEST if not stated
@@ -126,7 +126,7 @@ def _utf8(path: Path, data: bytes) -> bytes:
     return data
 
 
-def _parquet(path: Path, data: bytes, largest: int) -> Table:
+def _parquet(path: Path, data: bytes, largest: int) -> ColumnTable:
     import pandas
 
     try:
@@ -142,10 +142,10 @@ def _parquet(path: Path, data: bytes, largest: int) -> Table:
         raise InputError(f"data: {path} is Parquet, which needs the package pyarrow; install it, or give CSV") from None
     except (OSError, ValueError, KeyError, NotImplementedError, MemoryError) as error:
         raise InputError(f"data: {path} is not Parquet: {_short(str(error))}") from None
-    return Table(path, frame, np.arange(1, len(frame) + 1))
+    return ColumnTable(path, frame, np.arange(1, len(frame) + 1))
 
 
-def _csv(path: Path, data: bytes, columns: list[str] | None) -> Table:
+def _csv(path: Path, data: bytes, columns: list[str] | None) -> ColumnTable:
     import pandas
 
     if b"\n" not in data:
@@ -191,7 +191,7 @@ def _csv(path: Path, data: bytes, columns: list[str] | None) -> Table:
     filled = frame.notna().any(axis=1).to_numpy()
     cells = next(csv.reader([head.units], delimiter=separator), [])
     units = of_columns(path, head.unit_row, names, cells) if head.units else None
-    return Table(path, frame[filled], rows[filled], decimal, comments, units)
+    return ColumnTable(path, frame[filled], rows[filled], decimal, comments, units)
 
 
 def _without_preamble(data: bytes) -> bytes:

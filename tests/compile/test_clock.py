@@ -83,14 +83,14 @@ def test_it_stands_still_while_other_processes_compile(at: list[float], monkeypa
         def __init__(self, workers: int, *_: object) -> None:
             super().__init__(workers)
 
-    def compiles(kernel: warm.Kernel) -> str:
+    def compiles(kernel: warm.KernelSignature) -> str:
         at[0] += 40.0
         return kernel.name
 
     monkeypatch.setattr(warm, "ProcessPoolExecutor", Pool)
     monkeypatch.setattr(warm, "_compile", compiles)
-    monkeypatch.setattr(warm.Kernel, "cached", False)
+    monkeypatch.setattr(warm.KernelSignature, "cached", False)
     begin, said = clock.now(), list[str]()
-    warm.ahead([warm.Kernel("loop", ())], said.append)
+    warm.ahead([warm.KernelSignature("loop", ())], said.append)
     assert clock.now() == begin
     assert "loop (1 of 1" in said[1]

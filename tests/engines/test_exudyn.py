@@ -8,7 +8,7 @@ from shoal.engines.exudyn import ExudynEngine
 from shoal.engines.exudyn.build import build, library
 from shoal.engines.exudyn.cable import CablePart
 from shoal.engines.exudyn.checks import judge
-from shoal.engines.exudyn.record import Record, Steps, choose_steps
+from shoal.engines.exudyn.record import KeptStates, Steps, choose_steps
 from shoal.engines.gauss import GaussEngine
 from shoal.errors import InputError
 from shoal.scene import Scene, load_scene
@@ -309,7 +309,7 @@ def test_numerical_damping_and_drift_are_caught():
 @pytest.mark.parametrize(("shift", "status"), [(100.0, Status.OUT_OF_REACH), (np.nan, Status.DIVERGED)])
 def test_success_with_nonsense_is_not_believed(shift, status):
     machine = build(library(), load_scene("flexible-double-pendulum"), "ancf-cable")
-    record = Record(choose_steps(np.array([0.0]), 1e-3, machine.unknowns), machine.reference)
+    record = KeptStates(choose_steps(np.array([0.0]), 1e-3, machine.unknowns), machine.reference)
     record.take(machine.mbs, 0.0)
     assert judge(machine, record, "").status is Status.OK
     record.q += shift
@@ -348,7 +348,7 @@ def test_names_of_the_variants():
 def test_thinned_record_is_read_between_its_kept_steps() -> None:
     """A parabola is what cubic Hermite interpolation gives back, whatever steps were kept."""
     steps = Steps(np.array([0.5, 0.95, 1.0]), 10, 0.1, np.array([0, 4, 8, 10]), ((10, 1.0),))
-    record = Record(steps, np.zeros(1))
+    record = KeptStates(steps, np.zeros(1))
     record.q[:, 0], record.v[:, 0] = record.times**2, 2 * record.times
     q, v = record.at_wanted()
     np.testing.assert_allclose(q[:, 0], steps.wanted**2, atol=1e-14)

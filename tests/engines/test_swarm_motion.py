@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from shoal.engines import get_engine, swarm_motion
-from shoal.engines.swarm_motion import INTEGRATOR, GaussFunction, Search, Switches, gauss_function
+from shoal.engines.swarm_motion import INTEGRATOR, GaussFunction, SwarmSettings, Switches, gauss_function
 from shoal.errors import InputError
 from shoal.mechanics.simulate import simulate
 from shoal.scene import Scene, load_scene
@@ -27,7 +27,7 @@ def _with(scene: Scene, **settings: Any) -> Scene:
 
 
 def _run(scene: Scene, solver: str, steps: int = 5, *, switches: Switches | None = None, **settings: Any) -> Trajectory:
-    search = Search(switches=switches or Switches())
+    search = SwarmSettings(switches=switches or Switches())
     return swarm_motion.simulate(_with(scene, acceleration=solver, **settings), _times(steps), search)
 
 
@@ -222,7 +222,7 @@ def test_a_motion_without_freedom_needs_no_swarm() -> None:
 
 def test_progress_is_told_and_what_is_not_finite_has_diverged() -> None:
     seen: list[tuple[int, int]] = []
-    search = Search(progress=lambda done, steps: seen.append((done, steps)))
+    search = SwarmSettings(progress=lambda done, steps: seen.append((done, steps)))
     scene = _with(PENDULUM, acceleration="iafsa-printed", swarm_iterations=1)
     swarm_motion.simulate(scene, _times(3), search)
     assert seen == [(1, 3), (2, 3), (3, 3)]

@@ -16,7 +16,7 @@ from click.testing import CliRunner
 from shoal.cli import main
 from shoal.errors import InputError
 from shoal.identification import identify, load_problem
-from shoal.identification.judge.verdict import Verdict
+from shoal.identification.findings import MISFIT, SEVERAL_MINIMA
 from shoal.scene import load_scene
 from shoal.scene.load import scene_names
 from shoal_flows import jobs, workers
@@ -180,7 +180,7 @@ def _shifted(fit: Fit) -> Any:
 
 def test_champion_stays_where_validation_fails_and_the_tag_says_why(fits: list[Fit], no_nights: Path) -> None:
     assert registered(fits[0], "guarded").aliases == ["champion"]
-    rejected = replace(fits[0], estimate=replace(fits[0].estimate, verdict=Verdict.REJECTED))
+    rejected = replace(fits[0], estimate=replace(fits[0].estimate, findings=[MISFIT.found("the best fit is off")]))
     second = registered(rejected, "guarded")
     assert second.aliases == []
     assert second.tags["champion"] == "stayed; the identification ended with: model rejected"
@@ -202,7 +202,12 @@ def test_champion_stays_where_validation_fails_and_the_tag_says_why(fits: list[F
 
 def test_best_that_is_trusted_is_taken(fits: list[Fit]) -> None:
     good, better = fits
-    better = replace(better, estimate=replace(better.estimate, fitness=0.0, verdict=Verdict.AMBIGUOUS))
+    better = replace(
+        better,
+        estimate=replace(
+            better.estimate, fitness=0.0, findings=[SEVERAL_MINIMA.found("2 parameter sets fit equally well")]
+        ),
+    )
     with open_study("a study", [good.cell], good.estimate.measurement) as study:
         register(study, [better, good])
     assert study.registration

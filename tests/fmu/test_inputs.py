@@ -15,7 +15,7 @@ from shoal.cli import main
 from shoal.engines import get_engine
 from shoal.errors import InputError
 from shoal.fmu.export import export
-from shoal.fmu.inputs import Inputs
+from shoal.fmu.inputs import InputSignals
 from shoal.scene import Scene, load_scene
 from shoal.trajectory import Array
 
@@ -174,7 +174,7 @@ def test_a_drive_that_changes_later_leaves_the_start_as_it_is(tmp_path: Path) ->
 
 
 def test_tables_of_inputs() -> None:
-    inputs = Inputs({"loads.a.scale": 1.0, "joints.b.angle": 0.5})
+    inputs = InputSignals({"loads.a.scale": 1.0, "joints.b.angle": 0.5})
     assert inputs.take(0.0, 0.1, {"loads.a.scale": 2.0, "joints.b.angle": 0.5})
     assert not inputs.take(0.1, 0.1, {"loads.a.scale": 2.0, "joints.b.angle": 0.5})
     assert inputs.take(0.2, 0.1, {"loads.a.scale": 3.0, "joints.b.angle": 0.7})

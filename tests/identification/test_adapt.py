@@ -27,7 +27,10 @@ def test_a_mesh_error_above_the_noise_is_named() -> None:
     data = measure(problem, problem.load_scene())
     coarse = {"bodies.OA.elements": 3, "bodies.AB.elements": 5}
     estimate = identify(problem, values=coarse, measurement=data)
-    assert "exceeds the noise of 0.001 m; --tolerance 0.0003 finds a better mesh" in estimate.message
+    (limit,) = [one for one in estimate.findings if one.code == "mesh-error"]
+    assert limit.numbers["noise"] == pytest.approx(0.001)
+    assert limit.numbers["error"] > limit.numbers["noise"]
+    assert limit.numbers["tolerance"] == pytest.approx(0.001 / 3)
 
 
 def test_models_are_chosen_for_the_native_engine_only() -> None:

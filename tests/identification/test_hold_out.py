@@ -166,8 +166,8 @@ def test_a_motion_that_the_model_does_not_predict_refutes_it(tmp_path: Path) -> 
     found = identify(recorded, data=str(tmp_path / "run.csv"), method="least-squares")
     assert found.prediction[0].inside is False
     assert (found.verdict, found.status) == (Verdict.REJECTED, "failed")
-    assert found.message.startswith("held-out data refute the model: predicted ")
-    assert "predicted worse than the estimate states" in found.message
+    assert found.codes[0] == "held-out-data-refute"
+    assert "mispredicted" in found.codes
     assert "a prediction is worse than the estimate states" in found.advice[-1]
 
 

@@ -19,7 +19,7 @@ pytestmark = [
 
 @pytest.mark.parametrize("run", [1, 2, 3, 4])
 def test_a_free_clock_comes_out_fast(run: int) -> None:
-    """Run 0 alone gives 1.19 in its first second and 1.29 later: see docs/recordings.md."""
+    """Run 0 alone gives 1.19 in its first second and 1.29 later."""
     estimate = identify(load_problem("ibm-double-pendulum"), data=str(RECORDINGS / f"{run}.csv.gz"))
     assert estimate.verdict.trusted
     assert estimate.parameters["clock"].value == pytest.approx(1.26, abs=0.03)

@@ -36,7 +36,7 @@ def test_least_squares_on_casadi_data_of_the_same_mesh_is_exact(name: str) -> No
 def test_data_from_exudyns_fine_mesh_lie_within_the_intervals(name: str) -> None:
     estimate = run(name, "least-squares")
     assert estimate.verdict is Verdict.IDENTIFIED
-    assert "is all that the fit leaves; --tolerance" in estimate.message
+    assert "mesh-error" in estimate.codes
     for parameter, true in estimate.truth.items():
         found = estimate.parameters[parameter]
         assert found.value == pytest.approx(true, abs=1e-3)
@@ -51,7 +51,8 @@ def test_where_nothing_can_be_simulated_the_reason_is_told() -> None:
     strict = problem.model_copy(update={"values": {**problem.values, "solver.energy_tolerance": 1e-12}})
     estimate = identify(strict, method="least-squares", measurement=measurement)
     assert estimate.verdict is Verdict.FAILED
-    assert "no parameter set could be simulated (energy is off by" in estimate.message
+    assert estimate.codes[0] == "not-simulated"
+    assert "(energy is off by" in estimate.message
     # There is no residual, and nothing is said of its size.
     assert estimate.residual_tests.sentences() == []
     assert set(estimate.to_json()["residual_tests"].values()) == {None}
@@ -109,7 +110,8 @@ def test_one_instant_tells_a_pose_but_not_how_certain_it_is(tmp_path: Path) -> N
     fields = {"name": "one", "scene": "single-pendulum", "parameters": {"angle": angle}, "channels": channels}
     estimate = identify(Problem.model_validate({**fields, "source": source}))
     assert estimate.verdict is Verdict.FAILED
-    assert "2 measured numbers for 1 unknown: too few" in estimate.message
+    assert estimate.codes[0] == "too-few-samples"
+    assert estimate.findings[0].numbers == {"rows": 2, "parameters": 1}
     assert not estimate.parameters["angle"].identifiable
     assert estimate.parameters["angle"].value == pytest.approx(-np.pi / 3, abs=1e-3)
     noisy = [{**channel, "noise": 1e-3} for channel in channels]

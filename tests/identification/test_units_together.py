@@ -112,10 +112,10 @@ def test_a_search_for_the_cause_that_is_cut_ends_the_trust(monkeypatch: pytest.M
     def late(*_: Any) -> None:
         raise TimeIsUp
 
-    monkeypatch.setattr(search._Search, "run", late)
+    monkeypatch.setattr(search._FaultSearch, "run", late)
     found = identified(ENCODER_AND_IMU, 2, spring=0.4)
     assert found.verdict is Verdict.FAILED
-    assert "no time was left to see what a misfit of" in found.message
+    assert found.codes[0] == "no-time-to-judge"
 
 
 def test_rounded_samples_show_the_noise_of_rounding() -> None:

@@ -11,7 +11,7 @@ from shoal.mechanics import forces
 from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.analysis.statics import statics
 from shoal.mechanics.assembly.build import build
-from shoal.mechanics.assembly.loads import LOADS, Law, Loads
+from shoal.mechanics.assembly.loads import LOADS, ElementForceLaw, Loads
 from shoal.mechanics.forces import ANGLE, DISTANCE, PLACE
 from shoal.scene import Attachment, Function, Scene
 from shoal.scene.record import Record
@@ -32,7 +32,7 @@ class Pull(Record):
 def _enter(loads: Loads, name: str, load: Pull) -> None:
     ends = [loads.placement.point(loads.scene, side) for side in (load.first, load.second)]
     vectors = [*ends, *([ends[1]] if load.measure == PLACE else [])]
-    loads._measure(name, load.measure, vectors, Law(amplitude=-1.0), 0.0, drive=load.force)
+    loads._measure(name, load.measure, vectors, ElementForceLaw(amplitude=-1.0), 0.0, drive=load.force)
 
 
 @pytest.fixture(autouse=True)
@@ -67,7 +67,7 @@ def hung(*pulls: Any, dimensions: int = 2, **more: Any) -> Scene:
 
 
 def test_a_law_has_the_numbers_that_the_kernels_read_in_their_order() -> None:
-    assert [getattr(forces, field.upper()) for field in Law._fields] == list(range(forces.LAW))
+    assert [getattr(forces, field.upper()) for field in ElementForceLaw._fields] == list(range(forces.LAW))
 
 
 def test_loads_beside_each_other_act_as_if_alone() -> None:

@@ -53,11 +53,12 @@ def test_guesses_side_by_side_find_what_one_after_the_other_finds() -> None:
     for _ in range(60):
         lengths, base, guess = random.uniform(0.3, 2.0, 3).tolist(), random.uniform(0.5, 3.0), random.uniform(-3, 3, 2)
         assembly = Assembly(four_bar(lengths, float(base), b=float(guess[0]), c=float(guess[1])), 1)
-        fixed, values = assembly.held([one for one in assembly.statements if one.firm])
-        found = assembly.seek(fixed, values)
-        closure = Closure(assembly.scene, np.where(fixed, values, assembly.guess))
+        firm = [one for one in assembly.statements if one.firm]
+        fixed, first = assembly.held(firm)
+        found = assembly.seek(firm)
+        closure = Closure(assembly.scene, first)
         for attempt in range(ATTEMPTS):
-            begin = np.where(fixed, values, assembly._guess(attempt, fixed[:, 2::3]))
+            begin = assembly.held(firm, assembly._guess(attempt, fixed))[1]
             poses, gap = assembly.close(closure, begin, fixed)
             if gap[0] <= CLOSED:
                 assert found.ok[0]

@@ -15,6 +15,7 @@ from click.testing import CliRunner
 from shoal.cli import main
 from shoal.errors import InputError
 from shoal.identification import Estimate, Verdict, identify, load_problem
+from shoal.identification.findings import MISFIT, SEVERAL_MINIMA
 from shoal.pictures import archive, files
 from shoal.pictures.answer import Answer
 from shoal.pictures.gallery import model_choice, motions
@@ -41,7 +42,7 @@ def test_numbers_have_the_digits_of_their_uncertainty(several: Answer) -> None:
     assert shown(estimate, value) == ("998.8", "1.2", "996.2 to 1001.3", "yes")
     assert shown(estimate, replace(value, identifiable=False, at_bound=True)) == ("999", "–", "–", "at bound")
     # Nothing is known by an answer that is none.
-    assert shown(replace(estimate, verdict=Verdict.REJECTED), value) == ("999", "–", "–", "no")
+    assert shown(replace(estimate, findings=[MISFIT.found("the best fit is off")]), value) == ("999", "–", "–", "no")
     assert rounded(1.23456e12, 1e9) == "1.2346e+12"
 
 
@@ -49,7 +50,7 @@ def test_an_untrusted_answer_is_not_sold(pages: Callable[[str], str], several: A
     assert rejected.estimate.verdict is Verdict.REJECTED
     assert "Verdict: model rejected. Do not use these numbers." in pages("rejected")
     assert "Numbers that are no answer" in pages("rejected")
-    bad = Answer(several.problem, replace(several.estimate, verdict=Verdict.REJECTED, message="<too> far off"))
+    bad = Answer(several.problem, replace(several.estimate, findings=[MISFIT.found("<too> far off")]))
     assert "<li>&lt;too&gt; far off.</li>" in report(bad, motions(several)[:1], [])
 
 
@@ -71,7 +72,10 @@ def test_a_study_shows_all_and_the_best_in_full(pages: Callable[[str], str], est
 
 
 def test_the_best_is_one_that_can_be_used(estimates: dict[str, Estimate]) -> None:
-    doubtful = {**estimates, "fine": replace(estimates["fine"], verdict=Verdict.AMBIGUOUS)}
+    doubtful = {
+        **estimates,
+        "fine": replace(estimates["fine"], findings=[SEVERAL_MINIMA.found("2 parameter sets fit equally well")]),
+    }
     assert best_of(doubtful) == "coarse"
 
 

@@ -14,7 +14,7 @@ from click.testing import CliRunner
 from PIL import Image
 from shoal.cli import main
 from shoal.engines import get_engine
-from shoal.pictures.motion import Motion, plain_motion, scene_motion, upwards
+from shoal.pictures.motion import DrawnMotion, plain_motion, scene_motion, upwards
 from shoal.pictures.poses import poses
 from shoal.pictures.views import views
 from shoal.scene import Scene
@@ -29,7 +29,7 @@ def machine(**parts: Any) -> Scene:
 
 
 @pytest.fixture(scope="module")
-def linked() -> Motion:
+def linked() -> DrawnMotion:
     """A tilted crank, a bar on a universal joint, a block on a slider of its own, a mass on a thread, a spring."""
     axis = [1.0, 2.0, 2.0]
     scene = machine(
@@ -57,7 +57,7 @@ def linked() -> Motion:
     return scene_motion(scene, get_engine("gauss"), 0.6, frames=7)
 
 
-def test_bars_keep_their_length_and_their_section_turns_with_them(linked: Motion) -> None:
+def test_bars_keep_their_length_and_their_section_turns_with_them(linked: DrawnMotion) -> None:
     for name, length in (("crank", 1.0), ("bar", 0.5)):
         bar = linked.bars[name]
         along = bar.axis[:, 1] - bar.axis[:, 0]
@@ -69,7 +69,7 @@ def test_bars_keep_their_length_and_their_section_turns_with_them(linked: Motion
     assert linked.bars["crank"].axis[:, 1] == pytest.approx(linked.bars["bar"].axis[:, 0], abs=1e-9)
 
 
-def test_the_edges_of_a_bar_are_those_of_its_section(linked: Motion) -> None:
+def test_the_edges_of_a_bar_are_those_of_its_section(linked: DrawnMotion) -> None:
     edges = linked.bars["crank"].edges
     assert np.nanmax(np.linalg.norm(edges - edges[:, :1], axis=2), axis=1) == pytest.approx(
         np.hypot(1, np.hypot(0.1, 0.04))
@@ -78,7 +78,7 @@ def test_the_edges_of_a_bar_are_those_of_its_section(linked: Motion) -> None:
     assert np.nanmean(turned) == pytest.approx(1 / 6, abs=0.01)
 
 
-def test_the_cuboid_of_a_body_has_its_mass_and_inertia(linked: Motion) -> None:
+def test_the_cuboid_of_a_body_has_its_mass_and_inertia(linked: DrawnMotion) -> None:
     """Its moments, by 12 I = m (b^2 + c^2), about its own axes, in the body's frame at the start."""
     bar = linked.bars["block"]
     assert bar.stands_for
@@ -92,7 +92,7 @@ def test_the_cuboid_of_a_body_has_its_mass_and_inertia(linked: Motion) -> None:
     assert np.linalg.norm(middle - start, axis=1) == pytest.approx(0.1)
 
 
-def test_axes_of_joints_turn_with_the_bodies_that_carry_them(linked: Motion) -> None:
+def test_axes_of_joints_turn_with_the_bodies_that_carry_them(linked: DrawnMotion) -> None:
     assert linked.axes["O"][:, 1] == pytest.approx(np.tile(np.array([1, 2, 2]) / 3, (7, 1)))
     first, second = linked.axes["U"], linked.axes["U1"]
     assert np.sum(first[:, 1] * second[:, 1], axis=1) == pytest.approx(0.0, abs=1e-8)
@@ -101,12 +101,12 @@ def test_axes_of_joints_turn_with_the_bodies_that_carry_them(linked: Motion) -> 
     assert np.sum(linked.axes["S"][:, 1] * along, axis=1) / 0.5 == pytest.approx(np.cos(0.4))
 
 
-def test_threads_and_springs_are_lines_between_their_places(linked: Motion) -> None:
+def test_threads_and_springs_are_lines_between_their_places(linked: DrawnMotion) -> None:
     assert np.linalg.norm(np.diff(linked.links["D"], axis=1), axis=2) == pytest.approx(0.7)
     assert linked.links["K"][:, 1] == pytest.approx(linked.bars["bar"].axis[:, 0])
 
 
-def test_a_page_has_all_of_it_once(linked: Motion) -> None:
+def test_a_page_has_all_of_it_once(linked: DrawnMotion) -> None:
     data = plain_motion(linked)
     assert json.loads(json.dumps(data, allow_nan=False)) == data
     assert len(data["box"]) == 6
@@ -140,7 +140,7 @@ def test_up_is_against_gravity() -> None:
         assert upwards(machine(bodies=bodies, markers=markers, initial=at, gravity=gravity)).tolist() == up
 
 
-def test_drawings_show_every_view(linked: Motion) -> None:
+def test_drawings_show_every_view(linked: DrawnMotion) -> None:
     figure = poses(linked, "title")
     shown = {axes.get_title(loc="left"): (axes.get_xlabel(), axes.get_ylabel()) for axes in figure.axes}
     assert shown == {

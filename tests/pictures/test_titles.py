@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from shoal.pictures.answer import Answer
 from shoal.pictures.landscape import landscape, survey
-from shoal.pictures.motion import Motion
+from shoal.pictures.motion import DrawnMotion
 from shoal.pictures.pages import settings
 from shoal.pictures.paths import paths
 from shoal.pictures.style import canvas, headline, log_ticks
@@ -18,19 +18,19 @@ TIMES = np.linspace(0.0, 2.0, 5)
 
 
 @pytest.fixture
-def motion() -> Motion:
+def motion() -> DrawnMotion:
     """Two markers in one place that go 3 m to the side, and one that goes 0.5 m down."""
     aside = np.stack([1.5 * TIMES, np.zeros(5)], axis=1)
     down = np.stack([np.full(5, 0.25), -0.25 * TIMES], axis=1)
-    return Motion("", TIMES, np.empty((0, 2)), {}, {"A": aside, "B": aside.copy(), "C": down})
+    return DrawnMotion("", TIMES, np.empty((0, 2)), {}, {"A": aside, "B": aside.copy(), "C": down})
 
 
-def test_a_motion_says_where_it_ends_and_how_far_it_goes(motion: Motion) -> None:
+def test_a_motion_says_where_it_ends_and_how_far_it_goes(motion: DrawnMotion) -> None:
     assert ends("machine", motion) == "machine: C is at (0.25, −0.5) m after 2 s"
     assert reaches("machine", motion) == "machine: A moves within 3 m in x and 0 m in y in 2 s"
 
 
-def test_markers_in_one_place_are_one_line(motion: Motion) -> None:
+def test_markers_in_one_place_are_one_line(motion: DrawnMotion) -> None:
     figure = paths(motion, reaches("machine", motion))
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["A, B", "C"]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from shoal.notebook import uncertain
+from shoal.response import uncertain
 from sliding import puck
 
 

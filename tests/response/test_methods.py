@@ -13,13 +13,13 @@ from shoal.response.marginals import Interval, Normal
 from shoal.response.methods import get_method
 from shoal.response.methods.chebyshev_sparse import sparse_grid
 from shoal.response.methods.maximum_entropy import entropic_quantiles
-from shoal.response.runs import Answers, Runs
+from shoal.response.runs import Answers, CachedModel
 from shoal.response.statistics import QUANTILES
 from shoal.response.study import Found, Study
 from shoal.trajectory import Array
 
 
-def made(method: str, function: object, parameters: int, **wanted: int | None) -> tuple[Found, Runs]:
+def made(method: str, function: object, parameters: int, **wanted: int | None) -> tuple[Found, CachedModel]:
     """What a method leaves of a function of so many intervals [-1, 1]."""
     names = [f"x{k}" for k in range(parameters)]
 
@@ -28,7 +28,7 @@ def made(method: str, function: object, parameters: int, **wanted: int | None) -
         return Answers(found, np.ones(len(found), dtype=bool))
 
     inputs = Inputs(tuple(Parameter(name, Interval(-1.0, 1.0), {name: 1.0}) for name in names))
-    runs = Runs(model, inputs, 20_000)
+    runs = CachedModel(model, inputs, 20_000)
     found = get_method(method)(Study(runs, np.zeros(1, dtype=np.int64), np.zeros(1), **wanted))  # type: ignore[arg-type]
     return found, runs
 

@@ -14,7 +14,7 @@ from shoal.response.marginals import Frozen, Marginal, Normal, Uniform
 from shoal.response.methods.quadrature import gauss, quadrature
 from shoal.response.polynomials import HERMITE
 from shoal.response.respond import Answer
-from shoal.response.runs import Answers, Runs
+from shoal.response.runs import Answers, CachedModel
 from shoal.response.study import Study
 from shoal.trajectory import Array
 
@@ -102,7 +102,7 @@ def test_what_is_not_smooth_is_left_to_others() -> None:
         def model(values: Mapping[str, Array], function: Callable[[Array], Array] = function) -> Answers:
             return Answers(function(values["x"])[:, None], np.ones(len(values["x"]), dtype=bool))
 
-        runs = Runs(model, inputs, 20_000)
+        runs = CachedModel(model, inputs, 20_000)
         assert quadrature(Study(runs, np.zeros(1, dtype=np.int64), np.zeros(1))) is None
         assert runs.evaluations == runs.aside > 0
 

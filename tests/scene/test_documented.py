@@ -1,35 +1,27 @@
-"""docs/scenes.md leaves nothing out: every field of everything a scene is made of stands there as code."""
+"""The generated reference of scenes leaves nothing out: every field has a meaning, and every number a unit."""
 
-import re
-from collections.abc import Iterator
+import runpy
 from pathlib import Path
-from typing import Any, get_args
 
 import pytest
+from pydantic import BaseModel
 from shoal.scene import Scene
-from shoal.scene.record import Record
 
-PAGE = (Path(__file__).parents[2] / "docs" / "scenes.md").read_text(encoding="utf-8")
-CODE = " ".join(re.findall(r"```\w*\n.*?```|`[^`\n]+`", PAGE, re.DOTALL))
-
-
-def records(kind: Any) -> Iterator[type[Record]]:
-    """The models that a type is made of, each as often as it occurs."""
-    if isinstance(kind, type) and issubclass(kind, Record):
-        yield kind
-        for field in kind.model_fields.values():
-            yield from records(field.annotation)
-    for part in get_args(kind):
-        yield from records(part)
-
-
-MODELS = {model.__name__: model for model in records(Scene)}
+HOOKS = runpy.run_path(str(Path(__file__).parents[2] / "docs" / "hooks.py"))
+MODELS = {model.__name__: model for model in HOOKS["models"](Scene)}
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_every_field_is_named(name: str) -> None:
-    assert [field for field in MODELS[name].model_fields if not re.search(rf"\b{field}\b", CODE)] == []
+def test_every_field_has_a_meaning_and_a_number_its_unit(name: str) -> None:
+    model: type[BaseModel] = MODELS[name]
+    said = HOOKS["meanings"](model)
+    for field, info in HOOKS["fields"](model).items():
+        assert said.get(field), field
+        assert "[" in said[field] or not HOOKS["has_number"](info.annotation), f"{field}: {said[field]}"
 
 
 def test_all_kinds_were_looked_at() -> None:
     assert {"Rod", "PointMass", "Coupling", "DistributedForce", "MovingPoint", "Function", "Solver"} <= set(MODELS)
+    tables = HOOKS["scene_fields"]()
+    assert "| `length` | number > 0 | required | Length of the axis [m]. |" in tables
+    assert "| `gravity` | list of numbers | `[0, -9.81]` |" in tables

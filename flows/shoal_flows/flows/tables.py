@@ -46,7 +46,7 @@ def of_sweep(result: Sweep) -> str:
     """The points, at most as many as a page can show."""
     rows = result.rows()
     shown = table(list(rows[0]), (row.values() for row in rows[:_ROWS]))
-    notes = [*reasons(result), *filter(None, [result.elsewhere.told("points")])]
+    notes = [*reasons(result), *filter(None, [result.elsewhere.describe("points")])]
     notes += [] if result.check is None else [f"{result.check}."]
     notes += [f"The first {_ROWS} of {len(rows)} points; all are in sweep.csv."] if len(rows) > _ROWS else []
     return "\n\n".join([shown, *notes])

@@ -12,7 +12,7 @@ import numpy as np
 if TYPE_CHECKING:
     # A second of importing, which a page of what is in MLflow does without.
     from shoal.identification import Measurement
-    from shoal.identification.recording.measurement import Held, Recording
+    from shoal.identification.recording.measurement import HeldOut, Recording
 
 _CONTEXT = "mlflow.data.context"
 """The tag by which MLflow tells what a run used a data set for."""
@@ -49,9 +49,9 @@ def _of(name: str, recording: Recording) -> Data:
     return Data(called, digest, *map(json.dumps, ({"mlflow_colspec": columns}, told, source)))
 
 
-def _digest(recording: Recording, *held: Held) -> str:
+def _digest(recording: Recording, *held: HeldOut) -> str:
     """Hash the samples of a recording and the held-out windows, in the order of time."""
-    parts: list[Recording | Held] = [recording, *held]
+    parts: list[Recording | HeldOut] = [recording, *held]
     times = np.concatenate([part.times for part in parts])
     values = np.concatenate([part.values for part in parts])
     order = np.argsort(times, kind="stable")

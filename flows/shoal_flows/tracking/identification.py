@@ -90,6 +90,7 @@ def log_fit(fit: Fit, album: Album, study: str) -> str:
     """A child of the run `study` with all there is to know about one fit; returns its id."""
     cell, estimate = fit.cell, fit.estimate
     tags = {"kind": "optimisation", "problem": cell.title, "method": cell.method}
+    tags["findings"] = ", ".join(estimate.codes)
     judged = verdict(estimate)
     about = "" if judged.doubts else estimate.message
     with open_run("Identification", cell.name, tags=tags, parent=study, description=about, took=estimate.wall_s) as run:

@@ -12,7 +12,7 @@ from shoal.api.tasks import Bench, Note, to_json
 from shoal.errors import InputError
 from shoal.identification.problem import built_in_problems
 from shoal.scene.load import built_in_scenes
-from shoal.shelf import Entry, shelf
+from shoal.shelf import StoredVersion, shelf
 
 
 class NoSuch(InputError):  # noqa: N818 - a refusal, not a failure
@@ -38,7 +38,7 @@ def library(bench: Bench, asked: LibraryTask, note: Note) -> bytes:
     return to_json({**own.about(found), "versions": shelf().versions(kind, found.name), "files": files})
 
 
-def _put(kind: str, asked: LibraryTask, room: int) -> Entry:
+def _put(kind: str, asked: LibraryTask, room: int) -> StoredVersion:
     files = {}
     for path, content in (asked.files or {}).items():
         try:

@@ -66,7 +66,8 @@ class _Cache(caching.FunctionCache):  # type: ignore[misc]
     def _index_key(self, signature: Any, generator: Any) -> tuple[Any, ...]:
         """Return a key of texts: one of types is unreadable to versions that have their classes elsewhere."""
         _, *rest = super()._index_key(signature, generator)
-        return (" ".join(map(_text, getattr(signature, "args", signature))), *rest, key(self._py_func, signature))
+        kinds = " ".join(map(_text, getattr(signature, "args", signature)))
+        return (kinds, *rest, key(self._py_func, kinds))
 
 
 def _text(kind: Any) -> str:
@@ -83,9 +84,8 @@ def address_by_content(kernel: Any) -> None:
         kernel._cache = _Cache(function)
 
 
-def key(function: FunctionType, signature: Any) -> str:
+def key(function: FunctionType, kinds: str) -> str:
     """Return a hash of a kernel, of all that it calls with these types of arguments, and of the constants they read."""
-    kinds = str(signature)
     chosen = frozenset(kind for pairs in ALTERNATIVES.values() for kind, _ in pairs if kind.__name__ in kinds)
     return _hash(function, chosen)
 

@@ -8,6 +8,7 @@ that are longer than the processor's; results do not depend on it but for the ro
 
 from __future__ import annotations
 
+import itertools
 import operator
 from typing import Any
 
@@ -15,7 +16,10 @@ from llvmlite import ir
 from numba import njit, types
 from numba.core import cgutils
 from numba.core.datamodel import models
-from numba.extending import intrinsic, overload, register_model
+from numba.core.imputils import lower_builtin
+from numba.core.typing import signature
+from numba.core.typing.templates import AbstractTemplate, infer_global
+from numba.extending import intrinsic, register_model
 
 from shoal.compile.pointers import Pointer
 
@@ -290,39 +294,29 @@ def larger(typing_context, x, y):  # type: ignore[no-untyped-def]
     return x(x, y), generate
 
 
-@intrinsic
-def _negative(typing_context, x):  # type: ignore[no-untyped-def]
-    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-        return builder.fneg(arguments[0])
-
-    return x(x), generate
-
-
-def _binary(instruction: str) -> Any:
-    @intrinsic
-    def combined(typing_context, x, y):  # type: ignore[no-untyped-def]
-        count = (x if isinstance(x, Vector) else y).count
-        if isinstance(x, Vector) and isinstance(y, Vector) and x.count != y.count:
-            raise TypeError(f"{instruction}: vectors of lengths {x.count} and {y.count}")
-
-        def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-            kinds = zip(signature.args, arguments, strict=True)
-            both = [value if isinstance(kind, Vector) else _spread(builder, value, count) for kind, value in kinds]
-            return getattr(builder, instruction)(*both, flags=_FLAGS)
-
-        return Vector(count)(x, y), generate
-
-    return combined
-
-
 def _define(operation: Any, instruction: str) -> None:
-    combined = _binary(instruction)
+    """Let an operator of two vectors, or of a vector and a number, be an instruction, not a function to compile."""
 
-    @overload(operation)
-    def chosen(x, y):  # type: ignore[no-untyped-def]
-        if {type(x), type(y)} <= {Vector, types.Float} and Vector in (type(x), type(y)):
-            return lambda x, y: combined(x, y)
-        return None
+    @infer_global(operation)
+    class Operator(AbstractTemplate):  # type: ignore[misc]
+        def generic(self, arguments: Any, _named: Any) -> Any:
+            vectors = {kind for kind in arguments if isinstance(kind, Vector)}
+            if len(vectors) > 1:
+                lengths = " and ".join(str(kind.count) for kind in arguments)
+                raise TypeError(f"{instruction}: vectors of lengths {lengths}")
+            numbers = all(isinstance(kind, Vector | types.Float) for kind in arguments)
+            return signature(*vectors, *arguments) if vectors and numbers else None
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        count = signature.return_type.count
+        kinds = zip(signature.args, arguments, strict=True)
+        values = [value if isinstance(kind, Vector) else _spread(builder, value, count) for kind, value in kinds]
+        return getattr(builder, instruction)(*values, flags=() if len(values) == 1 else _FLAGS)
+
+    numbers = (Vector,) if instruction == "fneg" else (Vector, types.Float)
+    for kinds in itertools.product(numbers, repeat=1 if instruction == "fneg" else 2):
+        if Vector in kinds:
+            lower_builtin(operation, *kinds)(generate)
 
 
 for _operation, _instruction in (
@@ -330,13 +324,9 @@ for _operation, _instruction in (
     (operator.sub, "fsub"),
     (operator.mul, "fmul"),
     (operator.truediv, "fdiv"),
+    (operator.neg, "fneg"),
 ):
     _define(_operation, _instruction)
-
-
-@overload(operator.neg)
-def _negated(x):  # type: ignore[no-untyped-def]
-    return (lambda x: _negative(x)) if isinstance(x, Vector) else None
 
 
 @njit(error_model="numpy", forceinline=True)

@@ -1,18 +1,22 @@
-"""Structures of kernels in memory, behind a typed pointer.
+"""Structures of kernels in memory, passed by reference.
 
 A kernel that is handed a structure by value copies it, member by member. Here a structure is written once into storage
-of its own, and its address is passed on; `load` reads the members that are used.
+of its own, and its address is passed on.
 """
 
 from __future__ import annotations
 
+import hashlib
 import struct
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from numba import types
-from numba.extending import intrinsic
+from numba.core import cgutils
+from numba.core.imputils import lower_getattr_generic
+from numba.core.typing.templates import AttributeTemplate, infer_getattr
+from numba.extending import models, register_model
 
 BYTES = 8192
 """Room for the largest structure, which is checked where one is written."""
@@ -26,8 +30,7 @@ def storage() -> npt.NDArray[np.float64]:
 def write(place: npt.NDArray[np.float64], structure: tuple[Any, ...]) -> None:
     """Write a structure into its storage, with pointers in place of its arrays, which must outlive its use.
 
-    It is what `store` writes of `pointers.raw`, without a kernel of its own for every type of structure: members in
-    order, each at a multiple of its alignment, 8 bytes but for yes or no.
+    Members in order, each at a multiple of its alignment, 8 bytes but for yes or no.
     """
     memory = place.view(np.uint8).data
     end, _ = _laid(structure, 0, memory)
@@ -62,36 +65,53 @@ def _alignment(value: Any) -> int:
     return 1 if isinstance(value, bool | np.bool_) else 8
 
 
-@intrinsic
-def store(typing_context, place, structure):  # type: ignore[no-untyped-def]
-    """Write a structure of numbers and pointers into its storage (a pointer to float64)."""
+class Reference(types.Type):  # type: ignore[misc]
+    """The type of a structure in memory, whose members compiled code reads where it uses them.
 
-    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-        where, value = arguments
-        if context.get_abi_sizeof(value.type) > BYTES:
-            raise NotImplementedError("the structure is larger than its storage")
-        builder.store(value, builder.bitcast(where, value.type.as_pointer()), align=8)
-        return context.get_dummy_value()
+    A structure that is passed by value is passed member by member, to every function that a kernel calls: most of the
+    code of a large kernel. Parts that are structures with names are references too. Compiled code takes for granted
+    that nobody writes the structure itself while a kernel runs; the arrays it points to change.
+    """
 
-    return types.void(place, structure), generate
-
-
-@intrinsic
-def pointer_to(typing_context, place, structure):  # type: ignore[no-untyped-def]
-    """Return the storage of a structure as a pointer of its type; the structure itself is not read."""
-
-    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-        return builder.bitcast(arguments[0], context.get_value_type(signature.return_type))
-
-    return types.CPointer(structure)(place, structure), generate
+    def __init__(self, kind: Any) -> None:
+        self.dtype, self.instance_class = kind, kind.instance_class
+        layout = hashlib.sha256(_layout(kind).encode()).hexdigest()[:16]
+        super().__init__(f"{kind.instance_class.__name__}@{layout}")
 
 
-@intrinsic
-def load(typing_context, pointer):  # type: ignore[no-untyped-def]
-    """Return the structure at a pointer made by `pointer_to`."""
+def _layout(kind: Any) -> str:
+    """Return the members of a structure by name and type, and those of its parts."""
+    parts = ", ".join(map(_layout, getattr(kind, "types", ())))
+    own = getattr(kind, "instance_class", None)
+    return f"{own.__module__}.{own.__qualname__}{kind.fields}({parts})" if own else f"{kind}({parts})"
 
-    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-        kind = context.get_value_type(pointer.dtype)
-        return builder.load(builder.bitcast(arguments[0], kind.as_pointer()), align=8)
 
-    return pointer.dtype(pointer), generate
+@register_model(Reference)
+class _Address(models.PrimitiveModel):  # type: ignore[misc]
+    def __init__(self, manager: Any, kind: Reference) -> None:
+        super().__init__(manager, kind, manager.lookup(kind.dtype).get_value_type().as_pointer())
+
+
+def _member(kind: Any) -> Any:
+    return Reference(kind) if isinstance(kind, types.BaseNamedTuple) else kind
+
+
+@infer_getattr
+class _Members(AttributeTemplate):  # type: ignore[misc]
+    key = Reference
+
+    def generic_resolve(self, reference: Reference, name: str) -> Any:
+        """Return the type of a member."""
+        kind = reference.dtype
+        return _member(kind.types[kind.fields.index(name)]) if name in kind.fields else None
+
+
+@lower_getattr_generic(Reference)
+def _read(context: Any, builder: Any, reference: Reference, place: Any, name: str) -> Any:
+    number = reference.dtype.fields.index(name)
+    at = cgutils.gep_inbounds(builder, place, 0, number)
+    if isinstance(reference.dtype.types[number], types.BaseNamedTuple):
+        return at
+    value = builder.load(at)
+    value.set_metadata("invariant.load", builder.module.add_metadata([]))
+    return value

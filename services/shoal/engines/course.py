@@ -51,7 +51,7 @@ class Clock:
     until: float = np.inf
     halts: Array = field(default_factory=lambda: np.zeros(0))
 
-    def course(self, f: Function, *, held: bool = False) -> Course:
+    def course(self, f: Function, *, held: bool = False) -> PiecewiseFunction:
         """A function to be called; held: it prescribes a position. Raises InputError where it has no value or jumps."""
         if held:
             fitting.require_no_jump(f, self.horizon)
@@ -59,11 +59,11 @@ class Clock:
         inside = np.concatenate([fitted.kinks, narrow(fitted.breaks, self.step, False)])
         self.halts = np.union1d(self.halts, inside)
         pieces = None if f.formula is None else branches(f.formula, 0.0, self.horizon)
-        return Course(f, self, pieces, fitted.kinks)
+        return PiecewiseFunction(f, self, pieces, fitted.kinks)
 
 
 @dataclass(frozen=True)
-class Course:
+class PiecewiseFunction:
     """A function of time that knows where it is smooth."""
 
     function: Function

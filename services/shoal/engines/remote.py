@@ -1,4 +1,4 @@
-"""Client of an engine behind a service; its address can stand wherever an engine's name can.
+"""Client of an engine behind a service; its address can stand in place of an engine's name.
 
 Doubles cross as JSON in their shortest form, which gives back every bit; values that are not finite come back as NaN.
 """
@@ -88,7 +88,7 @@ class RemoteEngine:
     ) -> Trajectory:
         request = {
             "scene": scene.model_dump(mode="json"),
-            "at": None if times is None else numbers("times", times, "times in s").tolist(),
+            "times": None if times is None else numbers("times", times, "times in s").tolist(),
             "lanes": lanes,
             "verify": False,
         }

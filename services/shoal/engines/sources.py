@@ -83,7 +83,7 @@ class Examined:
     native: Engine
 
     def careful(self, what: str, make: Callable[[], Iterator[Scene]], times: int = 1) -> tuple[Careful | None, str]:
-        """Return the first run of some scenes, on so many times the unknowns, that can be had and believed.
+        """Return the first run of some scenes that can be made and believed. times: the unknowns of the examined run.
 
         If none can be believed, the last of them; if none can be had, None and why not the first.
         """
@@ -122,7 +122,7 @@ class Examined:
 
 
 @dataclass(frozen=True)
-class Source:
+class ErrorSource:
     """A source of error. concerns: whether a scene has it.
 
     look: estimates it by differences of runs, which add up; None, and the note says why, where it cannot
@@ -180,8 +180,9 @@ def of_mesh(seen: Examined) -> tuple[list[Deviation] | None, str]:
 
 
 def of_theory(seen: Examined) -> tuple[list[Deviation] | None, str]:
-    """Estimate what slender rods leave out, see `theory`; nothing where that is not known."""
-    return theory_deviations(seen.run, seen.scene, seen.native) or [], ""
+    """Estimate what slender rods leave out; see `theory`."""
+    found = theory_deviations(seen.run, seen.scene, seen.native)
+    return found, "" if found is not None else "theory error not estimated: no run with shear can be believed"
 
 
 def of_friction(seen: Examined) -> tuple[list[Deviation] | None, str]:
@@ -232,16 +233,16 @@ def _round_off(scale: float, *runs: Trajectory) -> float:
 
 
 def _apart(one: Trajectory, other: Trajectory) -> Array:
-    """How far the markers of two runs are apart [m], and in the plane how far they are turned [rad], (2,)."""
+    """Return the distance of the markers of two runs [m], and in the plane of their angles [rad], (2,)."""
     angles = turned(one.angles - other.angles) if len(one.axes) == 2 else np.zeros(1)
     return np.array([one.distance(other), np.max(np.abs(angles), initial=0.0)])
 
 
 SOURCES = (
-    Source("time", lambda scene: True, in_time),
-    Source("mesh", lambda scene: any(scene.flexible_rods), of_mesh),
-    Source("theory", lambda scene: True, of_theory),
-    Source("friction", lambda scene: bool(_rubbing(scene)), of_friction),
-    Source("bending", lambda scene: bool(_modal(scene)), of_bending),
+    ErrorSource("time", lambda scene: True, in_time),
+    ErrorSource("mesh", lambda scene: any(scene.flexible_rods), of_mesh),
+    ErrorSource("theory", lambda scene: True, of_theory),
+    ErrorSource("friction", lambda scene: bool(_rubbing(scene)), of_friction),
+    ErrorSource("bending", lambda scene: bool(_modal(scene)), of_bending),
 )
 """Of errors at the markers. The time step comes first: a run that it rejects is not looked at further."""

@@ -12,12 +12,12 @@ from shoal.scene import Scene
 from shoal.scene.initial import ABOUT_Z, UNITS, Quantity
 from shoal.trajectory import Array, Trajectory
 
-_TOLD = 3
+_NAMED = 3
 """So many values are named."""
 
 
 @dataclass(frozen=True)
-class Value:
+class ChangedValue:
     """A stated value of the start that runs do not keep.
 
     runs: how many; by: how far what they use is away at most, in `unit`
@@ -38,17 +38,17 @@ class Elsewhere:
 
     runs: int
     elsewhere: int
-    values: tuple[Value, ...]
+    values: tuple[ChangedValue, ...]
 
     def __bool__(self) -> bool:
         return self.elsewhere > 0
 
-    def told(self, runs: str = "runs") -> str:
-        """In words, empty if all runs start as stated; runs: what they are called."""
+    def describe(self, runs: str = "runs") -> str:
+        """Return a sentence on these runs, empty if all start as stated; runs: what they are called."""
         if not self:
             return ""
-        more = len(self.values) - _TOLD
-        values = ", ".join(map(str, self.values[:_TOLD])) + (f" and {more} more" if more > 0 else "")
+        more = len(self.values) - _NAMED
+        values = ", ".join(map(str, self.values[:_NAMED])) + (f" and {more} more" if more > 0 else "")
         return f"{self.elsewhere} of {self.runs} {runs} start elsewhere than stated, as the joints demand: {values}"
 
     def to_json(self) -> dict[str, Any]:
@@ -90,7 +90,7 @@ class Stated:
         """Summarise the distances from each value, (runs, values)."""
         count, most = (away > 0).sum(axis=0), away.max(axis=0, initial=0.0)
         values = tuple(
-            Value(f"initial.{body}.{quantity}", int(number), float(by), UNITS[quantity])
+            ChangedValue(f"initial.{body}.{quantity}", int(number), float(by), UNITS[quantity])
             for (body, quantity), number, by in zip(self.values, count, most, strict=True)
             if number
         )

@@ -56,7 +56,7 @@ class Switches:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Search:
+class SwarmSettings:
     """Settings of the search for the accelerations of a run.
 
     progress(steps done, steps in all): called after every step
@@ -66,7 +66,7 @@ class Search:
     progress: Callable[[int, int], None] | None = None
 
 
-def simulate(scene: Scene, times: Array, search: Search | None = None) -> Trajectory:
+def simulate(scene: Scene, times: Array, search: SwarmSettings | None = None) -> Trajectory:
     """Motion of a scene whose accelerations a swarm seeks, sampled at `times` [s]: the march of all other runs.
 
     The trajectory's `model` says under `swarm` what the swarm did: evaluations of Gauss's function counted,
@@ -80,7 +80,7 @@ def simulate(scene: Scene, times: Array, search: Search | None = None) -> Trajec
             f"use {INTEGRATOR} or auto"
         )
     steps = int(np.ceil(times[-1] / solver.step - 1e-9))
-    seeker = Seeker(solver, search or Search(), steps)
+    seeker = Seeker(solver, search or SwarmSettings(), steps)
     paced = scene.with_values({"solver.integrator": INTEGRATOR, "solver.acceleration": "projection"})
     run = mechanics.simulate(paced, times, seek=seeker.begin)
     named = "named by the scene" if solver.integrator == INTEGRATOR else "auto: the time step of the swarm's paper"
@@ -210,7 +210,7 @@ class Seeker:
     """Seeks one acceleration after the other, for `mechanics.simulate`; steps: of the run, for who waits."""
 
     solver: Solver
-    search: Search
+    search: SwarmSettings
     steps: int
     tally: _Tally = field(default_factory=_Tally)
 

@@ -89,7 +89,7 @@ class Sweep:
     @property
     def message(self) -> str:
         """Return why parts of it are rejected, and whether points start elsewhere than stated; empty if neither."""
-        return "; ".join(filter(None, (self.complaint, self.elsewhere.told("points"))))
+        return "; ".join(filter(None, (self.complaint, self.elsewhere.describe("points"))))
 
     @property
     def errors(self) -> ErrorBudget:

@@ -9,7 +9,7 @@ from shoal.engines.deviation import Deviation
 from shoal.errors import InputError
 from shoal.scene import Rod, Scene
 from shoal.scene.refined import unbent
-from shoal.scene.shear import slender_share
+from shoal.scene.shear import like_stout, slender_share
 from shoal.trajectory import Trajectory
 
 WITH_SHEAR = ("exudyn-ge",)
@@ -19,11 +19,7 @@ WITH_SHEAR = ("exudyn-ge",)
 def left_out(trajectory: Trajectory, scene: Scene, native: Engine, share: Callable[..., float] = max) -> float | None:
     """Displacement of the markers [m] that shear and rotary inertia would cause in a run of a scene.
 
-    None without rods that leave them out, or where it is not known. That the whole rod turns with its section's inertia
-    is the distance of two runs with rigid rods, with and without it. In the first bending mode of a flexible rod shear
-    and rotary inertia change the stiffness and the mass by pi^2 r^2 / L^2 times E / (kappa G) and 1 (Timoshenko 1921;
-    r radius of gyration of the section, kappa by Cowper 1966); this share of the effect that bending has at all, the
-    distance from the run with rigid rods, is an order of magnitude. share: which rod's counts, if not the largest.
+    0 without rods that leave them out, None where it cannot be estimated; see `theory_deviations`.
     """
     found = theory_deviations(trajectory, scene, native, share)
     return None if found is None else sum(one.distance for one in found)
@@ -32,18 +28,31 @@ def left_out(trajectory: Trajectory, scene: Scene, native: Engine, share: Callab
 def theory_deviations(
     trajectory: Trajectory, scene: Scene, native: Engine, share: Callable[..., float] = max
 ) -> list[Deviation] | None:
-    """The same as differences of runs, which add up; see `left_out`."""
+    """Return what shear and rotary inertia change of a run, as differences of runs that add up; None if unknown.
+
+    That the whole rod turns with its section's inertia is the distance of two runs with rigid rods, with and without
+    it. In the first bending mode of a flexible rod shear and rotary inertia change the stiffness and the mass by pi^2
+    r^2 / L^2 times E / (kappa G) and 1 (Timoshenko 1921; r radius of gyration of the section, kappa by Cowper 1966);
+    this share of the effect that bending has at all, the distance from the run with rigid rods, is an order of
+    magnitude. share: which rod's counts, if not the largest. Where rods have no rigid counterpart, as curved ones do,
+    or where those of rigid rods fail, it is the distance from a run whose rods are softer by their shares.
+    """
     _, slender = _rods(scene, trajectory.engine in WITH_SHEAR)
+    if not slender:
+        return []
     scenes = rigid_runs(scene, trajectory.engine)
     try:
         runs = [native.simulate(one, trajectory.times) for one in scenes]
+        if runs and all(run.ok for run in runs):
+            found = [Deviation("theory", runs[0], runs[1], (scenes[0], scenes[1]))]
+            counted = share((slender_share(rod) for rod in slender.values() if rod.element != "rigid"), default=0.0)
+            bent = [Deviation("theory", trajectory, runs[0], (scene, scenes[0]), counted)] if counted else []
+            return found + bent
+        softer = scene.with_values(like_stout(slender))
+        run = native.simulate(softer, trajectory.times)
     except InputError:
         return None
-    if not runs or not all(run.ok for run in runs):
-        return None
-    found = [Deviation("theory", runs[0], runs[1], (scenes[0], scenes[1]))]
-    counted = share((slender_share(rod) for rod in slender.values() if rod.element != "rigid"), default=0.0)
-    return found + ([Deviation("theory", trajectory, runs[0], (scene, scenes[0]), counted)] if counted else [])
+    return [Deviation("theory", trajectory, run, (scene, softer))] if run.ok else None
 
 
 def rigid_runs(scene: Scene, engine: str = "gauss") -> list[Scene]:
@@ -71,19 +80,3 @@ def _rods(scene: Scene, shearing: bool) -> tuple[dict[str, Rod], dict[str, Rod]]
     full = [name for name, rod in rods.items() if rod.shears or (shearing and rod.element != "rigid")]
     slender = {name: rod for name, rod in rods.items() if name not in full and not rod.rotary_inertia}
     return rods, slender
-
-
-def softer(trajectory: Trajectory, scene: Scene, native: Engine) -> float | None:
-    """Estimate by how much shear and rotary inertia would move the markers [m], where no rigid rod has the shape.
-
-    By order of magnitude it is the distance from the run of a scene whose rods are softer by that share; None if it
-    cannot be estimated.
-    """
-    _, slender = _rods(scene, trajectory.engine in WITH_SHEAR)
-    values = {
-        f"bodies.{name}.youngs_modulus": rod.youngs_modulus / (1.0 + slender_share(rod))
-        for name, rod in slender.items()
-        if rod.element != "rigid" and rod.youngs_modulus is not None
-    }
-    run = native.simulate(scene.with_values(values), trajectory.times)
-    return run.distance(trajectory) if run.ok else None

@@ -45,7 +45,7 @@ class Verification:
     kind; scale: how far the markers get from the ground [m];
     rejected: why the more careful run is itself not to be trusted; engine: that made the run, if it is not the native
     one, from which that of time is then how far it is off, whichever of them is wrong; not_estimated: sources whose
-    error is of interest and not known; deviations: the second runs, which tell the error of any other quantity too
+    error is of interest and not known; deviations: the second runs, which estimate the error of any other quantity too
     """
 
     time_error: float | None
@@ -75,7 +75,7 @@ class Verification:
 
     @property
     def complaint(self) -> str:
-        """Why the run is not to be trusted; empty if nothing speaks against it."""
+        """Return the reason for rejecting the run; empty if it is accepted."""
         if self.rejected:
             return f"a more careful run is rejected ({self.rejected}); use {SMALLER}"
         found = (self.time_error or 0.0, WRONG * self.scale, "m"), (self.angle_error or 0.0, WRONG, "rad")
@@ -102,7 +102,7 @@ class Verification:
 
     @property
     def warning(self) -> str:
-        """What a user must know of a run that is not rejected; empty if there is nothing."""
+        """Return a remark on errors that are large and do not reject the run; empty if there are none."""
         found = [self.note] if self.time_error is None and self.note else []
         if (self.theory_error or 0.0) > WORTH * self.scale:
             found.append(f"shear and rotary inertia that slender rods leave out are worth {self.theory_error:.2g} m")
@@ -174,8 +174,9 @@ def verify(trajectory: Trajectory, scene: Scene, native: Engine | None = None) -
 
 
 def _scale(trajectory: Trajectory, scene: Scene) -> float:
-    """How far the markers get from the nearest ground joint [m]; without one, the extent of their paths, and of the
-    machine where a single instant is looked at.
+    """Return the scale of errors: the largest distance of a marker from the nearest ground joint [m].
+
+    Without such joints, the extent of the markers' paths, and of the machine where there is a single instant.
     """
     points = trajectory.points[..., 0]
     sides = (side for joint in scene.joints.values() for side in places(joint))

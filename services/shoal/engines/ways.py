@@ -100,10 +100,11 @@ def _fallbacks(scene: Scene, first: Trajectory) -> Iterator[dict[str, Any]]:
 
 
 def careful(scene: Scene, trajectory: Trajectory, factor: float | None = None) -> Iterator[Scene]:
-    """The same mesh, with the usual treatment of constraints. factor: on the tolerance of an adaptive integrator.
+    """Yield more careful runs on the same mesh, with the usual treatment of constraints.
 
-    Steps of these may end at a longest one or where forces have kinks, whatever the tolerance. So those of a tighter
-    run are shorter in any case: two runs of the same steps would agree, however wrong both are.
+    factor: on the tolerance of an adaptive integrator. Its steps may end at a longest one or where forces have kinks,
+    and not by the tolerance. So those of a tighter run are shorter in any case: two runs with the same steps would
+    agree though both are off.
     """
     named = ("acceleration", "project", "rank_tolerance", "inertia_cap")
     usual = {name: Solver.model_fields[name].default for name in named}
@@ -133,15 +134,15 @@ def careful(scene: Scene, trajectory: Trajectory, factor: float | None = None) -
 
 
 def on_finer_mesh(scene: Scene, times: int) -> Iterator[Scene]:
-    """So many times as many elements, or modes."""
+    """Yield the scene with a multiple of the elements or modes, by the ways of `able`. times: the multiple."""
     yield from able(scene.with_values({**refined(scene, times), "solver.inertia_cap": False}), scene.solver.step)
 
 
 def able(scene: Scene, step: float) -> Iterator[Scene]:
     """Ways to run a scene with steps of at most `step` [s], from the cheapest and best on.
 
-    The stable step of leapfrog is that of the start; loops and stretched rods have shorter ones, which none tells
-    beforehand. Damping may leave it none that is of use.
+    The stable step of leapfrog is that of the start; loops and stretched rods have shorter ones, which are not
+    known beforehand. Damping may leave it none that is of use.
     """
     if not any(rod.element != "modal" for rod in scene.flexible_rods.values()):
         yield scene.with_values({"solver.integrator": "auto"})

@@ -16,7 +16,7 @@ import numpy as np
 from shoal.engines import get_engine
 from shoal.errors import ComputationError
 from shoal.fmu.energy import energies
-from shoal.fmu.inputs import Inputs
+from shoal.fmu.inputs import InputSignals
 from shoal.scene import Scene
 from shoal.trajectory import Array, Trajectory
 
@@ -33,7 +33,7 @@ class Ahead:
     """
 
     def __init__(self, scene: Scene, stop: float | None = None, inputs: dict[str, float] | None = None) -> None:
-        self._inputs, self._stated = Inputs(inputs or {}), scene
+        self._inputs, self._stated = InputSignals(inputs or {}), scene
         self._scene, self._horizon = self._inputs.applied(scene), stop or scene.solver.duration
         self._fresh = False
         self._run: Trajectory | None = None

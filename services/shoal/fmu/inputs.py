@@ -17,7 +17,7 @@ HELD = "scale", "torque"
 
 
 @dataclass
-class Inputs:
+class InputSignals:
     """Values by path, from time zero on.
 
     A load's is held from one communication point to the next. A prescribed position goes straight to its value and is

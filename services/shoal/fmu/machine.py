@@ -11,7 +11,7 @@ _HELD: list[Any] = []
 """pythonfmu's library (0.7) gives up references to this module that it does not own; a second instance would crash."""
 
 
-class Machine(SceneUnit):
+class ExportedUnit(SceneUnit):
     """The scene among the resources."""
 
     def __init__(self, **told: Any) -> None:

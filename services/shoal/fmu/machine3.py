@@ -13,7 +13,7 @@ _HELD: list[Any] = []
 """As in `machine`: pythonfmu3 grew out of pythonfmu."""
 
 
-class Machine(SceneUnit3, Fmi3Slave):  # type: ignore[misc]
+class ExportedUnit3(SceneUnit3, Fmi3Slave):  # type: ignore[misc]
     """The scene among the resources. The builder looks for the second name."""
 
     def __init__(self, **told: Any) -> None:

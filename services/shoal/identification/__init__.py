@@ -1,8 +1,8 @@
 """From measured motion to parameters with an honest uncertainty."""
 
 from shoal.identification.estimate import Estimate
+from shoal.identification.findings import Verdict
 from shoal.identification.identify import identify
-from shoal.identification.judge.verdict import Verdict
 from shoal.identification.measure import measure
 from shoal.identification.methods import METHODS
 from shoal.identification.problem import Problem, load_problem, problem_names

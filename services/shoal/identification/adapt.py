@@ -32,7 +32,7 @@ class Stopped(TimeIsUp):
 
 
 @dataclass(frozen=True)
-class Stage:
+class AdaptedModel:
     """One model on the way: what it is, its estimated error at the markers [m], and the evaluations spent on it."""
 
     model: str
@@ -43,13 +43,13 @@ class Stage:
 
 def coarse_to_fine(
     model: ForwardModel, search: Method, tolerance: float, rng: np.random.Generator, progress: Progress
-) -> tuple[ForwardModel, Outcome, list[Stage]]:
+) -> tuple[ForwardModel, Outcome, list[AdaptedModel]]:
     """Search with a method on a coarse model, then least squares from there on the model that meets `tolerance` [m].
 
     The models are chosen at the first pose that the data allow, and again where the search ended. Returns the final
     model, whose counter has counted both stages, with the outcome and the models on the way. Raises InputError.
     """
-    stages: list[Stage] = []
+    stages: list[AdaptedModel] = []
     start = starting_points(model)[0]
     coarse, chosen = _chosen(model, start, COARSER * tolerance)
     fine = coarse
@@ -95,6 +95,6 @@ def _chosen(model: ForwardModel, point: Array, tolerance: float) -> tuple[Forwar
     return replace(model, scene=model.scene.with_values(values)), selection
 
 
-def _stage(selection: Selection, evaluations: int) -> Stage:
+def _stage(selection: Selection, evaluations: int) -> AdaptedModel:
     chosen = selection.chosen
-    return Stage(chosen.name, selection.tolerance, chosen.error, evaluations)
+    return AdaptedModel(chosen.name, selection.tolerance, chosen.error, evaluations)

@@ -7,17 +7,20 @@ from typing import Any
 
 import numpy as np
 
-from shoal.identification.adapt import Stage
+from shoal.findings import Finding
+from shoal.identification import findings as kinds
+from shoal.identification.adapt import AdaptedModel
 from shoal.identification.carried import fitted, joint
 from shoal.identification.deadline import unless_late
 from shoal.identification.estimate import Estimate
 from shoal.identification.evidence import Evidence, evidence
+from shoal.identification.findings import Verdict
 from shoal.identification.forward import ForwardModel
-from shoal.identification.judge.other_laws import OtherLaw, other_laws, sentences
+from shoal.identification.judge.judgement import Judgement, judge
+from shoal.identification.judge.other_laws import OtherLaw, other_laws, wider_by_other_laws
 from shoal.identification.judge.remarks import beyond_noise, remarks
 from shoal.identification.judge.rivals import valley
 from shoal.identification.judge.turns import with_nearest_turns
-from shoal.identification.judge.verdict import Judgement, Verdict, judge
 from shoal.identification.lengthening import lengthened
 from shoal.identification.methods.growth import FRACTAL, LARGE, growth
 from shoal.identification.methods.lanes import Descent, descend_many, descend_on
@@ -25,7 +28,7 @@ from shoal.identification.methods.outcome import Outcome
 from shoal.identification.spread import intervals
 from shoal.identification.spread.bootstrap import bootstrap
 from shoal.identification.spread.curvature import bent, by_profile
-from shoal.identification.spread.posterior import Posterior, news, posterior
+from shoal.identification.spread.posterior import Posterior, differences, posterior
 from shoal.identification.spread.prediction import Prediction, predictions
 from shoal.identification.spread.profiles import Profile, profiles
 from shoal.identification.spread.rank import combinations
@@ -55,6 +58,8 @@ class Wishes:
 
 NOTHING = Wishes()
 
+_OF_FIRST = kinds.FIRST_MODE.found("the draws are about the first of them alone")
+
 
 def conclude(
     model: ForwardModel,
@@ -62,7 +67,7 @@ def conclude(
     method: str,
     seed: int,
     wall: float,
-    stages: list[Stage],
+    stages: list[AdaptedModel],
     wishes: Wishes,
     rounds: int = _ROUNDS,
 ) -> Estimate:
@@ -95,32 +100,29 @@ def conclude(
         ),
         [],
     )
-    fits, judgement = judgement.verdict.trusted, _refuted(judgement, foretold)
     drawn, undrawn = _drawn(model, near, judgement, wishes.sample, seed)
-    correlation = autocorrelation(near.seen.residual, near.blocks) if near.tests.made else np.nan
-    draws = wishes.bootstrap if near.known else 0
-    rng = np.random.default_rng(seed)
-    # Away from the minimum the mesh is not what limits the fit.
-    limits = judgement.verdict is not Verdict.UNFINISHED and not stages
-    notes = [
-        judgement.message or outcome.message,
-        *(_of_laws(model, near, known.laws, values) if fits else []),
-        beyond_noise(values, known.profiled, near.tests) if fits else "",
+    findings = [
+        *_refuted(judgement, foretold),
+        *(judgement.findings or _ended(outcome)),
+        *(_beside(model, near, known, values) if judgement.verdict.trusted else []),
         *remarks(
             values,
             known.profiled,
             known.bent(model),
             near.tests,
-            near.mesh if limits else None,
+            # Away from the minimum the mesh is not what limits the fit.
+            near.mesh if judgement.verdict is not Verdict.UNFINISHED and not stages else None,
             near.theory,
             bool(model.scene.flexible_rods),
         ),
-        *(one.sentence(near.at, model.names) for one in (*near.given, near.fields) if one is not None),
-        *([undrawn] if drawn is None else [drawn.sentence(), *news(drawn, values)]),
-        "the draws are about the first of them alone" * (drawn is not None and judgement.verdict is Verdict.AMBIGUOUS),
-        *(one.sentence(named=len(measurement.recordings) > 1) for one in foretold),
+        *(one for given in (*near.given, near.fields) if given is not None for one in given.findings(at, model.names)),
+        *(undrawn if drawn is None else [*drawn.findings(), *differences(drawn, values)]),
+        *([_OF_FIRST] if drawn is not None and judgement.verdict is Verdict.AMBIGUOUS else []),
+        *(one.finding(named=len(measurement.recordings) > 1) for one in foretold),
     ]
-    beyond = ["look for what the model leaves out: a prediction is worse than the estimate states"]
+    correlation = autocorrelation(near.seen.residual, near.blocks) if near.tests.made else np.nan
+    draws = wishes.bootstrap if near.known else 0
+    rng = np.random.default_rng(seed)
     carried, left = fitted(model.parameters, point)
     covariance = intervals.covariance(model, point, at)
     selected = {"selection": [vars(stage) for stage in stages]} if stages else {}
@@ -129,9 +131,7 @@ def conclude(
         method=method,
         engine=model.engine.name,
         seed=seed,
-        verdict=judgement.verdict,
-        message="; ".join(note for note in notes if note),
-        advice=judgement.advice + beyond * any(one.inside is False for one in foretold),
+        findings=findings,
         choice=outcome.choice,
         parameters={name: value.told() for name, value in values.items()},
         quantities={name: value.told() for name, value in known.quantities(model, near, judgement).items()},
@@ -223,42 +223,50 @@ def _known(model: ForwardModel, outcome: Outcome, near: Evidence, profiles_too: 
 
 
 def _judged(model: ForwardModel, near: Evidence, known: _Known) -> Judgement:
-    """The verdict; a failure where the answer cannot be simulated."""
+    """Return what the diagnostics find; a failure where the answer cannot be simulated."""
     if near.possible:
-        late = Judgement(Verdict.FAILED, "no time was left to judge the answer", ["allow more time"])
+        late = Judgement([kinds.NO_TIME.found("no time was left to judge the answer")])
         at_answer = near.seen, near.at, near.tests, near.score_test(model)
         return unless_late(lambda: judge(model, known.outcome, *at_answer, known.values, known.combinations), late)
     why = f" ({model.failure})" if model.failure else ""
-    return Judgement(Verdict.FAILED, f"no parameter set could be simulated{why}; look at starts, bounds and the scene")
+    text = f"no parameter set could be simulated{why}; look at starts, bounds and the scene"
+    return Judgement([kinds.NOT_SIMULATED.found(text)])
 
 
-def _refuted(judgement: Judgement, foretold: list[Prediction]) -> Judgement:
-    """A judgement with what windows that were held out say: an answer that they refute is none."""
+def _refuted(judgement: Judgement, foretold: list[Prediction]) -> list[Finding]:
+    """Return whether windows that were held out refute an answer that would be trusted."""
     worst = max((one for one in foretold if one.refutes), key=lambda one: one.ratio, default=None)
     if worst is None or not judgement.verdict.trusted:
-        return judgement
-    reason = f"held-out data refute the model: predicted {worst.ratio:.2g} times worse than the estimate states"
-    return replace(judgement, verdict=Verdict.REJECTED, message="; ".join(filter(None, [reason, judgement.message])))
+        return []
+    text = f"held-out data refute the model: predicted {worst.ratio:.2g} times worse than the estimate states"
+    return [kinds.HELD_OUT_REFUTES.found(text, ratio=worst.ratio)]
+
+
+def _ended(outcome: Outcome) -> list[Finding]:
+    """Return how the search ended, where it has something to say."""
+    return [kinds.SEARCH_ENDED.found(outcome.message)] if outcome.message else []
+
+
+def _beside(model: ForwardModel, near: Evidence, known: _Known, values: dict[str, Value]) -> list[Finding]:
+    """Return what other friction laws would change of an answer, and what its intervals hold beyond noise."""
+    laws = wider_by_other_laws(
+        known.laws, values, lambda law: intervals.parameters(model, law.end, near.at, near.correction)[law.sought]
+    )
+    return [*laws, *beyond_noise(values, known.profiled, near.tests)]
 
 
 def _drawn(
     model: ForwardModel, near: Evidence, judgement: Judgement, wanted: int, seed: int
-) -> tuple[Posterior | None, str]:
-    """So many draws from the posterior about a minimum; else why there are none, where some were wanted."""
+) -> tuple[Posterior | None, list[Finding]]:
+    """Draw from the posterior about a minimum, where draws are wanted; return also why there are none."""
     if not wanted:
-        return None, ""
+        return None, []
     if judgement.verdict in (Verdict.FAILED, Verdict.UNFINISHED):
-        return None, f"no posterior was drawn: '{judgement.verdict}' is no minimum to draw about"
+        text = f"no posterior was drawn: '{judgement.verdict}' is no minimum to draw about"
+        return None, [kinds.NO_POSTERIOR.found(text)]
     square = float(near.residual @ near.residual)
     drawn = unless_late(lambda: posterior(model, near.point, near.at, near.blocks, square, wanted, seed), None)
-    return drawn, "no posterior was drawn: no time was left"
-
-
-def _of_laws(model: ForwardModel, near: Evidence, laws: list[OtherLaw], values: dict[str, Value]) -> list[str]:
-    """What other laws of friction would change."""
-    return sentences(
-        laws, values, lambda law: intervals.parameters(model, law.end, near.at, near.correction)[law.sought]
-    )
+    return drawn, [kinds.NO_POSTERIOR.found("no posterior was drawn: no time was left")]
 
 
 def _fitted(scene: Scene) -> dict[str, Any]:

@@ -6,11 +6,12 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from shoal.errors import InputError
+from shoal.findings import Finding, message, steps
 from shoal.identification.dataset import dataset
+from shoal.identification.findings import Verdict, verdict_of
 from shoal.identification.judge.hypotheses import Hypothesis
 from shoal.identification.judge.residual_tests import ResidualTests
 from shoal.identification.judge.suspects import Suspect
-from shoal.identification.judge.verdict import Verdict
 from shoal.identification.recording.measurement import Measurement
 from shoal.identification.spread.bootstrap import Bootstrap
 from shoal.identification.spread.posterior import Posterior
@@ -32,7 +33,8 @@ class Estimate:
     history: evaluations and the best fitness after them; iterations: (iteration, best, mean fitness)
     evaluations: simulations; work: simulated time over that of one run of all recordings
     choice: which method was taken, and why; notes: what was found and mended in the recordings
-    advice: what to do next; suspects: what was taken as known and would explain a misfit if it were freed
+    findings: what was found out about the answer, the decisive first
+    suspects: what was taken as known and would explain a misfit if it were freed
     hypotheses: score tests of all that was taken as known, the most significant first
     minima: others that were found, by their parameters, the best first
     sensitivity_doubt: relative difference of derivatives by two step sizes
@@ -47,9 +49,7 @@ class Estimate:
     method: str
     engine: str
     seed: int
-    verdict: Verdict
-    message: str
-    advice: list[str]
+    findings: list[Finding]
     choice: str
     parameters: dict[str, Value]
     quantities: dict[str, Value]
@@ -90,6 +90,26 @@ class Estimate:
     def scene(self) -> Scene:
         """The identified machine, in the first recording."""
         return next(iter(self.scenes.values()))
+
+    @property
+    def verdict(self) -> Verdict:
+        """What may be made of the answer: the worst verdict that its findings imply."""
+        return verdict_of(self.findings)
+
+    @property
+    def codes(self) -> list[str]:
+        """The codes of the findings, in their order."""
+        return [one.code for one in self.findings]
+
+    @property
+    def message(self) -> str:
+        """The findings in one line."""
+        return message(self.findings)
+
+    @property
+    def advice(self) -> list[str]:
+        """What to do next."""
+        return steps(self.findings)
 
     @property
     def status(self) -> str:
@@ -140,6 +160,7 @@ class Estimate:
             "verdict": str(self.verdict),
             "message": self.message,
             "advice": self.advice,
+            "findings": [one.to_json() for one in self.findings],
             "problem": self.problem,
             "method": self.method,
             "engine": self.engine,

@@ -20,13 +20,13 @@ from shoal.identification.bounds import accepts
 from shoal.identification.deadline import Deadline, TimeIsUp
 from shoal.identification.loss import flatten, steepness
 from shoal.identification.parametrization import Parametrization
-from shoal.identification.placement import Placement, placement
+from shoal.identification.placement import AngleSensitivity, placement
 from shoal.identification.problem import Problem
 from shoal.identification.recording.clocks import by_clock
 from shoal.identification.recording.felt import asking, equipped, from_start
 from shoal.identification.recording.measurement import Measurement, Recording
 from shoal.identification.recording.observation import Camera, observe, without_turns
-from shoal.identification.recording.rows import Rows
+from shoal.identification.recording.rows import ResidualRows
 from shoal.mechanics.numerics.tile import WIDE
 from shoal.memory import Memory
 from shoal.scene import Scene
@@ -49,7 +49,7 @@ class ForwardModel:
 
     Points are vectors as `Parametrization` has them. `residuals` is wrapped by one counter, which every method shares.
     Fitness is the mean over the samples of the sum of squared residuals (for a tip: the mean squared distance [m^2]).
-    Where channels have different noise or units they are weighted (`Rows.weight`).
+    Where channels have different noise or units they are weighted (`ResidualRows.weight`).
 
     deadline: after which simulations raise TimeIsUp; memory: of evaluations made earlier
     whole: of a model of a part of the recordings, the model of all, which counts its evaluations too
@@ -74,7 +74,7 @@ class ForwardModel:
     reached: tuple[float, float, Array] = field(init=False, default=(0.0, np.inf, np.empty(0)))
     """Of the longest part of the recordings that was fitted: its end [s], the best fitness on it, and the point."""
 
-    _placements: dict[str, Placement] = field(init=False, default_factory=dict)
+    _placements: dict[str, AngleSensitivity] = field(init=False, default_factory=dict)
     _together: dict[tuple[str, ...], bool] = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -110,9 +110,9 @@ class ForwardModel:
         return np.where(self.parameters.logarithmic, 1.0, sizes)
 
     @cached_property
-    def rows(self) -> Rows:
+    def rows(self) -> ResidualRows:
         """What the rows of the residuals are, but for those of priors at their end."""
-        return Rows.of(self.measurement, (self.whole or self).measurement)
+        return ResidualRows.of(self.measurement, (self.whole or self).measurement)
 
     def until(self, end: float) -> ForwardModel:
         """The model of the samples up to a time [s]; its evaluations count here too."""
@@ -253,7 +253,7 @@ class ForwardModel:
             found[:, shown] = self._native.observe(points, name, np.zeros(1))[:, 0]
         return found
 
-    def _placement(self, points: Array, name: str) -> Placement | None:
+    def _placement(self, points: Array, name: str) -> AngleSensitivity | None:
         """How the channels of a recording follow from the angles of these points, where nothing else differs."""
         known = self._placements.get(name)
         if known is not None and known.knows(points):

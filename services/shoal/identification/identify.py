@@ -16,7 +16,7 @@ from shoal.arguments import check
 from shoal.compile import clock
 from shoal.engines import get_engine
 from shoal.errors import InputError
-from shoal.identification.adapt import Stage, Stopped, coarse_to_fine
+from shoal.identification.adapt import AdaptedModel, Stopped, coarse_to_fine
 from shoal.identification.carried import Carried
 from shoal.identification.conclude import NOTHING, Wishes, conclude
 from shoal.identification.deadline import Deadline, TimeIsUp, unless_late
@@ -167,7 +167,7 @@ def _search(
     tolerance: float | None,
     paces: bool,
     watch: Watch,
-) -> tuple[ForwardModel, Outcome, list[Stage]]:
+) -> tuple[ForwardModel, Outcome, list[AdaptedModel]]:
     """Run a method as long as it may; returns the model it ended with, where, and the models on the way.
 
     paces: whether the step may be shortened where the search ended
@@ -176,7 +176,7 @@ def _search(
     def progress(iteration: int, best: float, mean: float) -> None:
         watch(iteration, best, mean, asked.counter.evaluations)
 
-    asked, stages = model, list[Stage]()
+    asked, stages = model, list[AdaptedModel]()
     try:
         if tolerance is None:
             outcome = search(model, rng, progress)

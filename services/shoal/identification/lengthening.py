@@ -61,7 +61,10 @@ def lengthened(model: ForwardModel, point: Array) -> Descent | None:
 
 
 def _descend(model: ForwardModel, point: Array, jacobian: Array) -> tuple[Array, Array, Array]:
-    """Levenberg-Marquardt from a point, with derivatives near it; the end, residuals and derivatives there."""
+    """Levenberg-Marquardt from a point, with derivatives near it; the end, residuals and derivatives there.
+
+    Unlike in `numerics.levenberg_marquardt` the steps of several dampings are run side by side, as batch lanes.
+    """
     residual, damping = model.uncounted(point[None])[0], 1e-8
     for _ in range(_ITERATIONS):
         jacobian = _differentiated(model, point, residual, jacobian)

@@ -16,7 +16,7 @@ from shoal.trajectory import Array
 
 
 @dataclass(frozen=True)
-class Entry:
+class VectorComponent:
     """One component of the vector: the parameter `key` of the problem, of one recording or (None) of all."""
 
     key: str
@@ -41,15 +41,17 @@ class Parametrization:
         return cls(problem, recordings, {name: float(scene.value(path)) for name, path in problem.constants.items()})
 
     @cached_property
-    def entries(self) -> dict[str, Entry]:
+    def entries(self) -> dict[str, VectorComponent]:
         """The components by name, in the order of the vector."""
-        found: dict[str, Entry] = {}
+        found: dict[str, VectorComponent] = {}
         for key, parameter in self.problem.parameters.items():
             if parameter.own and self.problem.recordings:
                 owners = parameter.own if isinstance(parameter.own, tuple) else self.recordings
-                found |= {f"{name}.{key}": Entry(key, parameter, name) for name in self.recordings if name in owners}
+                found |= {
+                    f"{name}.{key}": VectorComponent(key, parameter, name) for name in self.recordings if name in owners
+                }
             else:
-                found[key] = Entry(key, parameter, None)
+                found[key] = VectorComponent(key, parameter, None)
         return found
 
     @cached_property

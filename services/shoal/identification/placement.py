@@ -24,7 +24,7 @@ Place = Callable[[Array], Array]
 
 
 @dataclass(frozen=True)
-class Placement:
+class AngleSensitivity:
     """How channels depend on the angles at the start, while all other parameters stay what they are.
 
     angles: components of the angles; base: the point that tells the others, (parameters,); rest: (channels,);
@@ -39,7 +39,7 @@ class Placement:
     turning: Array
 
     @classmethod
-    def of(cls, place: Place, channels: Sequence[Channel], angles: Sequence[int], point: Array) -> Placement:
+    def of(cls, place: Place, channels: Sequence[Channel], angles: Sequence[int], point: Array) -> AngleSensitivity:
         """From 1 + 2 angles poses about a point; channels: x, y and angles of bodies."""
         count, base = len(angles), point.copy()
         base[list(angles)] = 0.0
@@ -75,7 +75,7 @@ def placement(
     recording: Recording,
     points: Array,
     place: Place,
-) -> Placement | None:
+) -> AngleSensitivity | None:
     """Of points that differ in their angles alone, for a recording; None for other points, and other machines.
 
     The machine has to be an open chain that stands at its stated angles, and to be seen by what is linear in its pose.
@@ -89,5 +89,5 @@ def placement(
     scene = scene.with_values(recording.stated.known) if recording.stated.known else scene
     if late or scene.initial_from is not None or not is_direct(scene):
         return None
-    found = Placement.of(place, recording.channels, angles, points[0])
+    found = AngleSensitivity.of(place, recording.channels, angles, points[0])
     return found if found.knows(points) and np.all(np.isfinite(found.rest)) else None

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping
 
-from shoal.imported.markup import Element
+from shoal.imported.markup import XmlElement
 
 Known = Mapping[str, frozenset[str] | None]
 """Attributes that are translated, by tag or by parent/tag; None of elements that are accounted for with all inside."""
@@ -103,9 +103,9 @@ _REASONS = {
 }
 
 
-def unread(root: Element, known: Known) -> Iterator[str]:
+def unread(root: XmlElement, known: Known) -> Iterator[str]:
     """Yield a line for each tag with attributes that are not translated, and for each tag of elements that are not."""
-    attributes: dict[str, dict[str, list[Element]]] = {}
+    attributes: dict[str, dict[str, list[XmlElement]]] = {}
     for parent, element in _pairs(root, known):
         for name in element.attributes:
             if name not in (_allowed(parent, element, known) or ()) and not name.startswith("xmlns"):
@@ -114,7 +114,7 @@ def unread(root: Element, known: Known) -> Iterator[str]:
         counted = (f"{len(names[name])} x {name}" if len(names[name]) > 1 else name for name in sorted(names))
         first = min(element.line for having in names.values() for element in having)
         yield f"<{tag}>: {', '.join(counted)} (from line {first})"
-    elements: dict[str, list[Element]] = {}
+    elements: dict[str, list[XmlElement]] = {}
     for element in unknown(root, known):
         elements.setdefault(element.tag, []).append(element)
     for tag, found in elements.items():
@@ -123,13 +123,13 @@ def unread(root: Element, known: Known) -> Iterator[str]:
         yield f"<{tag}>: {len(found)} ({where} line {found[0].line}){why}"
 
 
-def unknown(root: Element, known: Known) -> Iterator[Element]:
+def unknown(root: XmlElement, known: Known) -> Iterator[XmlElement]:
     """Yield the elements that the tables do not have, without those inside them."""
     for _, element in _pairs(root, known):
         yield from (child for child in element.children if _is_unknown(element, child, known))
 
 
-def constraints(root: Element) -> Iterator[str]:
+def constraints(root: XmlElement) -> Iterator[str]:
     """Yield a line for each unknown element of a URDF file that joins links: without it other motions are possible."""
     links = {link.attributes.get("name", "") for link in root.named("link")}
     for element in unknown(root, URDF):
@@ -154,21 +154,21 @@ def _words(texts: Iterable[str]) -> Iterator[str]:
         yield from (text.strip(), *re.split(r"[\s,:]+", text))
 
 
-def _allowed(parent: Element | None, element: Element, known: Known) -> frozenset[str] | None:
+def _allowed(parent: XmlElement | None, element: XmlElement, known: Known) -> frozenset[str] | None:
     key = f"{parent.tag if parent is not None else ''}/{element.tag}"
     return known[key] if key in known else known.get(element.tag)
 
 
-def _is_unknown(parent: Element, element: Element, known: Known) -> bool:
+def _is_unknown(parent: XmlElement, element: XmlElement, known: Known) -> bool:
     key, kind = f"{parent.tag}/{element.tag}", parent.attributes.get("type", "")
     if key in _OF_TYPES and kind not in _OF_TYPES[key]:
         return True
     return key not in known and element.tag not in known
 
 
-def _pairs(root: Element, known: Known) -> Iterator[tuple[Element | None, Element]]:
+def _pairs(root: XmlElement, known: Known) -> Iterator[tuple[XmlElement | None, XmlElement]]:
     """Yield the elements that the tables have attributes of, each with its parent."""
-    waiting: list[tuple[Element | None, Element]] = [(None, root)]
+    waiting: list[tuple[XmlElement | None, XmlElement]] = [(None, root)]
     while waiting:
         parent, element = waiting.pop(0)
         if _allowed(parent, element, known) is None:

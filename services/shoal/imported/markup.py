@@ -14,7 +14,7 @@ _NESTED = 10
 
 
 @dataclass
-class Element:
+class XmlElement:
     """An element of XML.
 
     line: where its tag begins, from 1; begin, end: the bytes of the file from its tag to the end of its closing tag
@@ -27,13 +27,13 @@ class Element:
     begin: int = 0
     end: int = 0
     text: str = ""
-    children: list[Element] = field(default_factory=list)
+    children: list[XmlElement] = field(default_factory=list)
 
-    def named(self, *tags: str) -> Iterator[Element]:
+    def named(self, *tags: str) -> Iterator[XmlElement]:
         """Yield its children of these tags."""
         return (child for child in self.children if child.tag in tags)
 
-    def walk(self) -> Iterator[Element]:
+    def walk(self) -> Iterator[XmlElement]:
         """Yield itself and everything inside, in the order of the file."""
         yield self
         for child in self.children:
@@ -44,15 +44,15 @@ class Element:
         return f"<{self.tag}{f' {name}' if name else ''}> in line {self.line}"
 
 
-def parse(file: Path, data: bytes) -> Element:
+def parse(file: Path, data: bytes) -> XmlElement:
     """Return the root element of a file. Names keep their prefixes, declared or not. Raises InputError."""
     parser = expat.ParserCreate()
     parser.buffer_text = True
-    top = Element("", {}, file=file)
+    top = XmlElement("", {}, file=file)
     open_ = [top]
 
     def begins(tag: str, attributes: dict[str, str]) -> None:
-        element = Element(tag, attributes, parser.CurrentLineNumber, file, parser.CurrentByteIndex)
+        element = XmlElement(tag, attributes, parser.CurrentLineNumber, file, parser.CurrentByteIndex)
         open_[-1].children.append(element)
         open_.append(element)
 
@@ -73,9 +73,9 @@ def parse(file: Path, data: bytes) -> Element:
     return top.children[0]
 
 
-def with_includes(root: Element, folder: Path, depth: int = 0) -> Element:
+def with_includes(root: XmlElement, folder: Path, depth: int = 0) -> XmlElement:
     """Put the contents of files of `<include file="...">` in the place of these elements, as MuJoCo does."""
-    children: list[Element] = []
+    children: list[XmlElement] = []
     for child in root.children:
         path = folder / child.attributes.get("file", "")
         if child.tag == "include" and depth < _NESTED and path.is_file():

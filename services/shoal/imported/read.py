@@ -18,7 +18,7 @@ from shoal.imported.axes import Axes
 from shoal.imported.bodies import initial, is_mass, mass, rigid
 from shoal.imported.equalities import add_equalities
 from shoal.imported.hanging import hang
-from shoal.imported.markup import Element, parse, with_includes
+from shoal.imported.markup import XmlElement, parse, with_includes
 from shoal.imported.parts import Parts
 from shoal.imported.rounding import numbers
 from shoal.imported.source import Source
@@ -81,7 +81,7 @@ def read(file: Path) -> Imported:
     return Imported(scene, tuple(parts.left_out), tuple(parts.missing), tuple(notes), warned)
 
 
-def _audit(file: Path, root: Element, parts: Parts) -> None:
+def _audit(file: Path, root: XmlElement, parts: Parts) -> None:
     """List what of the file's XML is not translated."""
     if root.tag == "robot":
         for line in constraints(root):
@@ -142,7 +142,7 @@ def _rest(data: dict[str, Any], scene: Scene, away: dict[str, float]) -> None:
     """States the angles [rad], as the mechanics counts them, of torsion springs that rest so far from the start."""
     from shoal.mechanics.assembly.loads import Loads
     from shoal.mechanics.assembly.placement import place
-    from shoal.mechanics.rows import Rows
+    from shoal.mechanics.derived import Rows
 
     if away:
         loads = Loads(scene, place(scene), Rows(0), 0.0)

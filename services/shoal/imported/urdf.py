@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from shoal.errors import InputError
-from shoal.imported.markup import Element
+from shoal.imported.markup import XmlElement
 
 _WORLD = "world"
 _BOM = b"\xef\xbb\xbf"
@@ -15,7 +15,7 @@ _BOM = b"\xef\xbb\xbf"
 class _Robot:
     """The links of a file, and which are fixed together."""
 
-    def __init__(self, root: Element) -> None:
+    def __init__(self, root: XmlElement) -> None:
         self.links = {link.attributes.get("name", ""): link for link in root.named("link")}
         self.joints = list(root.named("joint"))
         self.sides = [(_side(joint, "parent"), _side(joint, "child")) for joint in self.joints]
@@ -42,7 +42,7 @@ class _Robot:
         return name in self.links and any(self.links[name].named("inertial", "collision"))
 
 
-def urdf_spec(mujoco: Any, file: Path, written: bytes, root: Element) -> tuple[Any, list[str]]:
+def urdf_spec(mujoco: Any, file: Path, written: bytes, root: XmlElement) -> tuple[Any, list[str]]:
     """Return a MjSpec of a URDF file, and notes on what was assumed.
 
     written: the bytes of the file; root: their XML. Raises InputError, and ValueError where MuJoCo refuses it.
@@ -58,12 +58,12 @@ def urdf_spec(mujoco: Any, file: Path, written: bytes, root: Element) -> tuple[A
     return spec, [*_roots(robot), *_shapes(robot)]
 
 
-def _side(joint: Element, side: str) -> str:
+def _side(joint: XmlElement, side: str) -> str:
     """Return the link that a joint names as its parent or child."""
     return next((one.attributes.get("link", "") for one in joint.named(side)), "")
 
 
-def _needed(text: bytes, robot: _Robot, root: Element) -> bytes:
+def _needed(text: bytes, robot: _Robot, root: XmlElement) -> bytes:
     """Return a file without shapes that carry no mass, and with the link `world` where joints name it, as Drake allows.
 
     The lines that MuJoCo's messages name stay those of the file.
@@ -79,7 +79,7 @@ def _needed(text: bytes, robot: _Robot, root: Element) -> bytes:
     return text
 
 
-def _check(file: Path, root: Element, robot: _Robot) -> None:
+def _check(file: Path, root: XmlElement, robot: _Robot) -> None:
     """Refuse what MuJoCo would misread, or name by numbers of its own."""
     for element in root.walk():
         if element.tag.startswith("xacro:"):

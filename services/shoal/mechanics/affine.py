@@ -1,22 +1,24 @@
 """Points and directions of bodies as affine functions of the coordinates.
 
-A coordinate is a real unknown, its coefficient a vector of R^d. What joints share is eliminated by substituting such
-expressions: a point shared by two bodies, a direction kept by a weld, a place on a fixed line (one unknown). No
-multiplier, no drift.
+A coordinate is a real unknown, its coefficient a vector of R^d. Constraints that are linear in them are eliminated by
+substitution: a point shared by two bodies, a direction kept by a weld, a place on a fixed line (one unknown). They
+need no multiplier and have no drift.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
+from shoal.mechanics import plane
 from shoal.mechanics.numerics.tile import Array, Number
 
 ROUND_OFF = 1e-12
-"""Of the coefficients of a unit vector."""
+"""Of the coefficients of a unit vector, and of places in parts of the machine's size: some thousand rounding errors."""
 
 
 def is_zero(value: Number) -> bool:
@@ -84,19 +86,48 @@ class Affine:
 
 
 def mapped(matrix: Array, u: Array) -> Array:
-    """A matrix (d, d, lanes) times a vector (d, lanes)."""
+    """Return the product of a matrix (d, d, lanes) and a vector (d, lanes)."""
     return np.stack([sum(entry * part for entry, part in zip(row, u, strict=True)) for row in matrix])
 
 
 def fixed(value: Array) -> Affine:
-    """A vector that does not move, (d, lanes)."""
+    """Return a constant vector, (d, lanes)."""
     return Affine({}, value)
 
 
 def combined(vectors: tuple[Affine, ...], factors: tuple[Number, ...]) -> Affine:
-    """The sum of vectors times numbers; those times zero are left out, so that their unknowns are."""
+    """Return a linear combination of vectors, without the unknowns of those whose factor is zero."""
     total = fixed(0.0 * vectors[0].constant)
     for one, factor in zip(vectors, factors, strict=True):
         if np.any(factor):
             total = total + one * factor
     return total
+
+
+class Points(NamedTuple):
+    """Vectors that are affine in the coordinates: matrix (vectors, d, unknowns) and constant (vectors, d)."""
+
+    matrix: Array
+    constant: Array
+
+    def at(self, q: Array) -> Array:
+        """The vectors at the coordinates q, (vectors, d)."""
+        return self.matrix @ q + self.constant
+
+    def turning(self, q: Array) -> Array:
+        """Return the derivatives of the angles [rad] of directions at q, about z, (vectors, unknowns)."""
+        now = self.at(q)[:, :2]
+        x, y = self.matrix.transpose(1, 0, 2)[:2]
+        return np.asarray(plane.cross(now.T[..., None], (x, y)) / np.sum(now**2, axis=1)[:, None])
+
+
+def points(vectors: Sequence[Affine], unknowns: int, lane: int = 0) -> Points:
+    """Vectors of a placement as one matrix, in one of its lanes."""
+    dimensions = len(vectors[0].constant) if vectors else plane.DIMENSIONS
+    matrix = np.zeros((len(vectors), dimensions, unknowns))
+    constant = np.zeros((len(vectors), dimensions))
+    for k, vector in enumerate(vectors):
+        constant[k] = vector.constant[:, lane % vector.constant.shape[1]]
+        for unknown, coefficient in vector.terms.items():
+            matrix[k, :, unknown] += coefficient[:, lane % coefficient.shape[1]]
+    return Points(matrix, constant)

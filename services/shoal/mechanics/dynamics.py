@@ -173,17 +173,17 @@ def add_mean_force(tile: Tile, m: Arrays, w: Work, before: Array, after: Array, 
         families.add_mean_force(tile, family, before, after, f, w.element)
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def accelerate(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, tolerance: float, a: Array) -> None:
     """Turn all of the force in `a` into the acceleration by Gauss's principle, valid on the unknowns."""
     if m.constraints.size > 0 or m.table.sought != 0:
-        arguments = (structures.pointer_to(m.storage, m), structures.pointer_to(w.storage, w), t, z, zdot, tolerance, a)
+        arguments = (m, w, t, z, zdot, tolerance, a)
         function_pointers.call(m.table.constrain, (tile, *arguments))
     else:
         _solve(tile, m, w, a)
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def _solve(tile: Tile, m: Arrays, w: Work, a: Array) -> None:
     """Turn a force into the acceleration of a machine without constraints."""
     if m.alike.components > 0:
@@ -192,7 +192,7 @@ def _solve(tile: Tile, m: Arrays, w: Work, a: Array) -> None:
         sparse.solve(tile, m.pattern, m.mass_factor, a, 0)
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def constrain(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, tolerance: float, a: Array) -> None:
     """Accelerate with constraints, or where another method finds the acceleration; see `accelerate`."""
     if m.table.sought != 0:
@@ -206,7 +206,7 @@ def constrain(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, t
             w.power[lane] -= w.gauss.power[lane]
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def _constrain(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, tolerance: float, a: Array) -> None:
     """By the principle: once, or until friction by the forces of joints agrees with them, see `rubbing`."""
     r, rounds, searching = m.rubbing, 0, True

@@ -11,10 +11,10 @@ import numpy as np
 
 from shoal.mechanics.assembly.loads import Loads
 from shoal.mechanics.assembly.placement import place
+from shoal.mechanics.derived import Rows
 from shoal.mechanics.forces import ANGLE
 from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import Array
-from shoal.mechanics.rows import Rows
 from shoal.scene.ended import BodyState, End, mesh_of
 
 
@@ -34,16 +34,16 @@ class Ended(Mapping[str, Any]):
     angles: Array
 
     def __getitem__(self, field: str) -> Any:
-        return self._told[field]
+        return self._plain[field]
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._told)
+        return iter(self._plain)
 
     def __len__(self) -> int:
-        return len(self._told)
+        return len(self._plain)
 
     @cached_property
-    def _told(self) -> dict[str, Any]:
+    def _plain(self) -> dict[str, Any]:
         scene = self.model.stated
         bodies = {}
         for name, body in scene.bodies.items():
@@ -61,7 +61,7 @@ class Ended(Mapping[str, Any]):
 
     def __reduce__(self) -> tuple[Any, ...]:
         # A model holds addresses of this process.
-        return dict, (self._told,)
+        return dict, (self._plain,)
 
 
 def named_turns(model: Model, turns: Array) -> dict[str, tuple[float, ...]]:

@@ -88,7 +88,7 @@ for _k in range(_SIZE):
     _TO_POWERS[_k, : _k + 1] = np.polynomial.chebyshev.cheb2poly(np.eye(_SIZE)[_k])[: _k + 1]
 
 
-class _Stretch(NamedTuple):
+class _SmoothInterval(NamedTuple):
     """Intervals (intervals,) on which a function is the smooth tree `node`, or smooth as its knots promise."""
 
     function: Callable[[Any], Any]
@@ -139,20 +139,22 @@ def _fit(
 
 def _stretches(
     function: Callable[[Any], Any], begin: float, horizon: float, knots: Sequence[float]
-) -> tuple[list[_Stretch], Array]:
+) -> tuple[list[_SmoothInterval], Array]:
     """Return the smooth stretches of a function, and the points between them."""
     if (node := getattr(function, "formula", None)) is not None:
         pieces = branches(node, begin, horizon)
         found = [
-            _Stretch(partial(formula.value, part), part, pieces.edges[numbers], pieces.edges[numbers + 1])
+            _SmoothInterval(partial(formula.value, part), part, pieces.edges[numbers], pieces.edges[numbers + 1])
             for part, numbers in pieces.groups().items()
         ]
         return found, pieces.edges[1:-1]
     edges = np.unique(np.array([begin, *(knot for knot in knots if begin < knot < horizon), horizon], dtype=float))
-    return [_Stretch(function, None, edges[:-1], edges[1:])], edges[1:-1]
+    return [_SmoothInterval(function, None, edges[:-1], edges[1:])], edges[1:-1]
 
 
-def _bisected(part: _Stretch, begin: float, horizon: float, scale: float, steep: bool) -> list[tuple[Array, Array]]:
+def _bisected(
+    part: _SmoothInterval, begin: float, horizon: float, scale: float, steep: bool
+) -> list[tuple[Array, Array]]:
     """Left ends and powers of the pieces of one stretch; scale: size of the function, as far as it is known."""
     function, node, lower, upper = part
     whole = horizon - begin

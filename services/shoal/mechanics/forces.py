@@ -83,7 +83,7 @@ def initial_memory(tile: Tile, forces: Forces, z: Array, intended: Array) -> Arr
     return np.where(forces.kind[:, None] == ANGLE, memory, 0.0).ravel()
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def _angle(ax, ay, bx, by, last):  # type: ignore[no-untyped-def]
     """The angle from a to b that is nearest to the last one."""
     change = np.arctan2(ax * by - ay * bx, ax * bx + ay * by) - last
@@ -225,7 +225,7 @@ def slip(tile: Tile, forces: Forces, number: int, zdot: Array, w: Array) -> None
         add_product(tile, w, rate, w, rows + k, zdot, forces.rows[rows * number + k])
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def _friction(limit, speed, rate):  # type: ignore[no-untyped-def]
     """Smoothed Coulomb force and its slope in the rate."""
     if limit == 0.0:

@@ -11,7 +11,7 @@ from shoal.errors import InputError
 from shoal.mechanics import plane
 from shoal.mechanics.affine import Affine, combined, fixed
 from shoal.mechanics.elements.element import Element
-from shoal.mechanics.modal.numbers import Modes
+from shoal.mechanics.modal.modes import ModalIntegrals
 from shoal.mechanics.numerics.tile import Number
 
 Place = tuple[Number, ...]
@@ -70,7 +70,7 @@ class ModalFrame(RigidFrame):
     q e less the stretch times e_perp.
     """
 
-    modes: Modes
+    modes: ModalIntegrals
     amplitudes: tuple[Affine, ...]
 
     def point(self, place: Place) -> Affine:

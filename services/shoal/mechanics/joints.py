@@ -50,7 +50,7 @@ class JointCondition:
 
     @property
     def is_of_start(self) -> bool:
-        """Return whether it keeps a number, whatever it is, that the start has."""
+        """Return whether it keeps the value that the start has, which is not stated."""
         return False
 
     def constrain(self, name: str, bodies: Any) -> None:

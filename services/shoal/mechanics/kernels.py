@@ -3,8 +3,7 @@
 Forces, constraints and each family of elements are compiled once, and not into every integrator. Each public function
 calls the kernel of the same name by its address; the kernel follows it, with an underscore. `ready` compiles the
 kernels that a model calls, or takes them from the cache: constraints where there are some, and the families of elements
-that it has. What only leads to the work is put into its caller by Numba (`inline="always"`), as LLVM optimises all that
-a function calls once more for every function above it.
+that it has.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ from numba import njit, typeof, types
 from shoal.compile import locks
 from shoal.compile.function_pointers import address, call
 from shoal.compile.pointers import raw_type
-from shoal.compile.structures import load, pointer_to, storage, store
+from shoal.compile.structures import Reference, storage
 from shoal.mechanics import dynamics
 from shoal.mechanics.dynamics import ACCELERATION, ALL, ELASTIC, SIMPLE, Work, instant
 from shoal.mechanics.elements import families
@@ -37,42 +36,33 @@ replaces by the acceleration). The state, C_q and eta are in the work space, whe
 _CALLED = ctypes.CFUNCTYPE(None, ctypes.c_double, ctypes.POINTER(ctypes.c_double))
 
 
-@njit(cache=True, error_model="numpy")
-def enter(m: Arrays, w: Work) -> None:
-    """Write both structures into their storage, where kernels read them; at the beginning of a compiled loop."""
-    store(m.storage, m)
-    store(w.storage, w)
-
-
 @njit(cache=True, error_model="numpy", forceinline=True)
 def force(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, f: Array) -> None:
     """All of `dynamics.force`."""
     t = instant(w, t)
-    call(m.table.motion, (tile, pointer_to(m.storage, m), pointer_to(w.storage, w), t, z, zdot, 0.0, f, ALL))
+    call(m.table.motion, (tile, m, w, t, z, zdot, 0.0, f, ALL))
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def elastic_force(tile: Tile, m: Arrays, w: Work, z: Array, f: Array, exact: bool) -> None:
     """The elastic part of `dynamics.force`; exact: without the elements of `dynamics.add_mean_force`."""
     part = SIMPLE if exact else ELASTIC
-    call(m.table.motion, (tile, pointer_to(m.storage, m), pointer_to(w.storage, w), 0.0, z, z, 0.0, f, part))
+    call(m.table.motion, (tile, m, w, 0.0, z, z, 0.0, f, part))
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def acceleration(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, tolerance: float, a: Array) -> None:
     """All of `dynamics.force`, then `dynamics.accelerate`; z, zdot, a: (rows, lanes)."""
     t = instant(w, t)
-    arguments = (pointer_to(m.storage, m), pointer_to(w.storage, w), t, z, zdot, tolerance, a, ACCELERATION)
+    arguments = (m, w, t, z, zdot, tolerance, a, ACCELERATION)
     call(m.table.motion, (tile, *arguments))
 
 
 @njit(cache=True, error_model="numpy")
-def _motion(tile, pm, pw, t, z, zdot, tolerance, a, part):  # type: ignore[no-untyped-def]
-    # Each way loads what it looks at itself; all of both structures at every step would cost as much as two elements.
-    if part == ACCELERATION and dynamics.free(load(pm)):
-        dynamics.free_acceleration(tile, load(pm), load(pw), z, zdot, a)
+def _motion(tile, m, w, t, z, zdot, tolerance, a, part):  # type: ignore[no-untyped-def]
+    if part == ACCELERATION and dynamics.free(m):
+        dynamics.free_acceleration(tile, m, w, z, zdot, a)
         return
-    m, w = load(pm), load(pw)
     dynamics.force(tile, m, w, t, z, zdot, a, part)
     if part == ACCELERATION:
         dynamics.accelerate(tile, m, w, t, z, zdot, tolerance, a)
@@ -89,36 +79,35 @@ def settle(
     if m.constraints.size > 0 and m.projects:
         t = instant(w, t)
         ready = found and m.table.sought == 0 and m.method == PROJECTION
-        arguments = (pointer_to(m.storage, m), pointer_to(w.storage, w), t, tolerance, iterations, ready)
+        arguments = (m, w, t, tolerance, iterations, ready)
         call(m.table.settle, (tile, *arguments))
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def meet(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float) -> None:
     """Let driven constraints take up their new rates at once: a plastic impact, the least change in the mass metric."""
-    call(m.table.settle, (tile, pointer_to(m.storage, m), pointer_to(w.storage, w), t, tolerance, 3, False))
+    call(m.table.settle, (tile, m, w, t, tolerance, 3, False))
 
 
 @njit(cache=True, error_model="numpy")
-def _settle(tile, pm, pw, t, tolerance, iterations, ready):  # type: ignore[no-untyped-def]
-    m, w = load(pm), load(pw)
+def _settle(tile, m, w, t, tolerance, iterations, ready):  # type: ignore[no-untyped-def]
     drift.project(tile, m, w.gauss, t, w.z, w.zdot, tolerance, iterations, ready)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def energies(tile: Tile, m: Arrays, w: Work) -> None:
     """`dynamics.energies`."""
-    call(m.table.energies, (tile, pointer_to(m.storage, m), pointer_to(w.storage, w)))
+    call(m.table.energies, (tile, m, w))
 
 
 @njit(cache=True, error_model="numpy")
-def _energies(tile, pm, pw):  # type: ignore[no-untyped-def]
-    dynamics.energies(tile, load(pm), load(pw))
+def _energies(tile, m, w):  # type: ignore[no-untyped-def]
+    dynamics.energies(tile, m, w)
 
 
 @njit(cache=True, error_model="numpy")
-def _constrain(tile, pm, pw, t, z, zdot, tolerance, a):  # type: ignore[no-untyped-def]
-    dynamics.constrain(tile, load(pm), load(pw), t, z, zdot, tolerance, a)
+def _constrain(tile, m, w, t, z, zdot, tolerance, a):  # type: ignore[no-untyped-def]
+    dynamics.constrain(tile, m, w, t, z, zdot, tolerance, a)
 
 
 @njit(cache=True, error_model="numpy")
@@ -203,7 +192,7 @@ def _kernel(name: str, tile: Tile, *parts: Any) -> Kernel:
         kernel, own = _FAMILY_KERNELS[name]
         return kernel, (typeof(tile), *raws, *own)
     kernel, own = _STATE_KERNELS[name]
-    return kernel, (typeof(tile), *(types.CPointer(kind) for kind in raws), *own)
+    return kernel, (typeof(tile), *(Reference(kind) for kind in raws), *own)
 
 
 def _address(name: str, tile: Tile, *parts: Any) -> int:

@@ -48,7 +48,7 @@ _BUT_SOLVER = {"solver"}
 class Machine:
     """A scene as the native solver sees it. Threads may share it.
 
-    scene: with the usual pace (`PACE`); nobody else holds it
+    scene: a private copy, with the usual pace (`PACE`)
     """
 
     def __init__(self, scene: Scene) -> None:

@@ -76,9 +76,8 @@ def _call(address: int, storage: Array) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def loop(place):  # type: ignore[no-untyped-def]
-    """The march of the frame at a place."""
-    frame = structures.load(place)
+def loop(frame):  # type: ignore[no-untyped-def]
+    """The march of a frame."""
     tile, scheme, m, w, k, record = frame.tile, frame.scheme, frame.arrays, frame.room, frame.own, frame.record
     step, steps, tolerance = frame.step, frame.steps, frame.tolerance
     times, marker_rows = carray(frame.times, frame.samples), carray(frame.marker_rows, frame.directed)

@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit, typeof, types
+from numba import njit, typeof
 
 from shoal.compile.pointers import raw_type
+from shoal.compile.structures import Reference
 from shoal.mechanics import constraints
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.halts import Halts
@@ -162,7 +163,7 @@ def loop_of(frame: Frame) -> tuple[Any, ...]:
 
 def frame_type(frame: Frame) -> Any:
     """The compiler's type of a frame's place in memory, which takes a millisecond to find."""
-    return types.CPointer(raw_type(typeof(frame)))
+    return Reference(raw_type(typeof(frame)))
 
 
 FARTHEST, ENERGY_DRIFT, CONSTRAINT_DRIFT, ENERGY_SCALE = range(4)

@@ -18,7 +18,6 @@ from shoal.mechanics import plane
 from shoal.mechanics import reach as reaches
 from shoal.mechanics.assembly.groups import start_angle
 from shoal.mechanics.assembly.redundancy import redundant_joints
-from shoal.mechanics.assembly.space import start as spatial
 from shoal.mechanics.assembly.starts import Starts
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.ended import Ended
@@ -63,7 +62,7 @@ class Runs:
         self._limits = Limits(scene, model)
         self._turns = _turns(scene, model)
         self._idle: dict[tuple[bytes, int, int, bool], tuple[Halts, list[Workspace]]] = {}
-        self._told: dict[bool, bytes] = {}
+        self._found: dict[bool, bytes] = {}
         self._alike = not model.varies
 
     def run(
@@ -111,18 +110,18 @@ class Runs:
             told(record, len(tile), part.start, turns, limits.anchors, floor, limits.span, motion, numbers)
             if single:
                 left.append(space.left)
-            if single not in self._told:
-                self._told[single] = pickle.dumps(self._facts(record.begin if single else None))
+            if single not in self._found:
+                self._found[single] = pickle.dumps(self._facts(record.begin if single else None))
             if seek is None and self._alike and space.size <= LARGEST:
                 idle.append(space)
 
         workers = min(most, len(parts))
         if end == 0.0 and seek is None and self._alike and not self.model.constraints.size:
-            self._still.told(moved, turns, limits.anchors, motion, numbers)
+            self._still.fill(moved, turns, limits.anchors, motion, numbers)
             states = None if states is None else states._replace(q=moved.q0[None].copy(), v=moved.v0[None].copy())
-            if single not in self._told:
+            if single not in self._found:
                 start = np.concatenate([moved.q0[:, 0], moved.v0[:, 0]])
-                self._told[single] = pickle.dumps(self._facts(start if single else None))
+                self._found[single] = pickle.dumps(self._facts(start if single else None))
         elif workers == 1:
             for part in parts:
                 march(part)
@@ -130,7 +129,7 @@ class Runs:
             list(_pool(workers).map(march, parts))
         status, reasons = limits.verdict(numbers, self.choice, moved.failed)
         largest = np.maximum.reduce(numbers, axis=1)
-        facts = pickle.loads(self._told[single])
+        facts = pickle.loads(self._found[single])
         facts["evaluations"] = int(largest[EVALUATIONS])
         if largest[CLOSENESS] > 0.0:
             facts["distance_from_singular"] = float(largest[CLOSENESS] ** -0.5)
@@ -224,10 +223,7 @@ class Runs:
     def _started(self, begun: Array) -> dict[str, Any]:
         """The start as it is used, what of it was stated otherwise, and joints whose forces are not unique."""
         scene, model = self.scene, self.model
-        if scene.dimensions == 3:
-            used = spatial.begun(model.frames, *np.split(begun, 2))
-        else:
-            used = start.begun(model.frames, model.scene, *np.split(begun, 2))
+        used = start.begun(model.frames, model.scene, *np.split(begun, 2))
         redundant = () if start.is_direct(scene) else redundant_joints(scene, used)
         told = start.facts(scene, used, float(reaches.size(scene))) | {"redundant_joints": list(redundant)}
         return dict(plain(told))
@@ -243,35 +239,33 @@ class Changes(Sequence[Mapping[str, Any]]):
     model: Model
 
     def __getitem__(self, lane: Any) -> Any:
-        return self._told[lane]
+        return self._found[lane]
 
     def __len__(self) -> int:
         return self.model.lanes
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Sequence) and self._told == list(other)
+        return isinstance(other, Sequence) and self._found == list(other)
 
     __hash__ = None  # type: ignore[assignment]
 
     def __repr__(self) -> str:
-        return repr(self._told)
+        return repr(self._found)
 
     @cached_property
-    def _told(self) -> list[dict[str, Any]]:
+    def _found(self) -> list[dict[str, Any]]:
         model, lanes = self.model, self.model.lanes
         stated = model.stated
-        if stated.dimensions == 2 and not stated.starts_at_rest and start.is_direct(stated):
+        if not stated.starts_at_rest and start.is_direct(stated):
             return [{} for _ in range(lanes)]
         q, v = (np.broadcast_to(x, (len(x), lanes)) for x in (model.q0, model.v0))
-        space = stated.dimensions == 3
-        used = spatial.begun(model.frames, q, v) if space else start.begun(model.frames, model.scene, q, v)
-        found = start.changes(stated, used, reaches.size(stated), lanes)
+        found = start.changes(stated, start.begun(model.frames, model.scene, q, v), reaches.size(stated), lanes)
         failed = np.broadcast_to(model.failed, lanes)
         return [{} if none else one for one, none in zip(found, failed, strict=True)]
 
     def __reduce__(self) -> tuple[Any, ...]:
         # A model holds addresses of this process.
-        return list, (self._told,)
+        return list, (self._found,)
 
 
 def check_step(scene: Scene, choice: Choice) -> None:

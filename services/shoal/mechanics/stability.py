@@ -1,7 +1,7 @@
-"""The largest step an explicit integrator may take, from the highest frequency of the scene.
+"""Stability limit of explicit integrators: the largest step, from the highest frequency and decay rate of the machine.
 
-The frequency is that of the linearised system at the initial state, without the constraints (which
-can only lower it: Rayleigh's interlacing).
+They are those of the equations linearised at the initial state (Hughes, The Finite Element Method, 2000, section
+9.1), without the constraints, which can only lower them (Rayleigh's interlacing theorem).
 """
 
 from __future__ import annotations
@@ -17,10 +17,9 @@ from shoal.mechanics.numerics.tile import Array, pack, tiles, unpack
 from shoal.mechanics.tangent import damping_at, stiffness_at, tangent_tile
 
 _DENSE = 200
-"""Up to so many unknowns the dense eigenproblem is the faster one, as Lanczos's method has to be imported first."""
+"""Unknowns up to which the dense eigenproblem is solved, as the import of Lanczos's method takes longer."""
 _ACCURACY = 1e-6
-"""Relative, of an eigenvalue by Lanczos's method, whose last digits are no better known along the motion."""
-
+"""Relative error of an eigenvalue by Lanczos's method: along the motion it changes by more."""
 _SAME = 1e-5
 """Relative difference of the matrices of two lanes that count as one."""
 
@@ -65,7 +64,7 @@ def _largest_eigenvalue(model: Model, damping: bool) -> float:
 
 
 def _different(matrix: Array, mass: Array) -> list[int]:
-    """The lanes without those that are another one's neighbours, as those of finite differences are."""
+    """Return one lane of each group with nearly equal matrices, as those of finite differences are."""
     both = np.concatenate(
         [matrix / np.max(np.abs(matrix), initial=1e-300), mass / np.max(np.abs(mass), initial=1e-300)]
     )

@@ -26,8 +26,8 @@ class Still:
         self._matrix, self._constant = matrix[rows], constant[rows, None]
         self._shape = rows.size // (2 * d), 2, d
 
-    def told(self, model: Model, turns: Array, anchors: Array, motion: Array, numbers: Array) -> None:
-        """Fill the results of `marched.told` for the start of a model, where nothing has moved or lost energy."""
+    def fill(self, model: Model, turns: Array, anchors: Array, motion: Array, numbers: Array) -> None:
+        """Fill the results of a run (`runs`) at the start of a model, where nothing has moved or lost energy."""
         place, change = self._matrix @ model.q0 + self._constant, self._matrix @ model.v0
         (points, along), (velocities, turning) = (
             rows.reshape(*self._shape, -1).transpose(1, 0, 2, 3) for rows in (place, change)

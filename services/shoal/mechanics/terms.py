@@ -10,15 +10,13 @@ from typing import Any
 import numpy as np
 
 from shoal.mechanics import plane
-from shoal.mechanics.affine import Affine, fixed
+from shoal.mechanics.affine import ROUND_OFF, Affine, fixed
 from shoal.mechanics.constraints import OPEN, Constraints
+from shoal.mechanics.derived import Rows
 from shoal.mechanics.numerics.tile import Array, Number, index, stacked
-from shoal.mechanics.rows import Rows
 from shoal.scene.function import Composed
 
 CONSTANT = -1
-ROUND_OFF = 1e-12
-"""Of unit vectors, and of a machine of one metre."""
 
 
 @dataclass(frozen=True)

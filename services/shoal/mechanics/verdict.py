@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from shoal.mechanics import reach as reaches
+from shoal.mechanics.affine import ROUND_OFF
 from shoal.mechanics.constraints import OPEN
 from shoal.mechanics.forces import ANGLE, LAW, STIFFNESS
 from shoal.mechanics.functions import value
@@ -16,8 +17,6 @@ from shoal.scene import GROUND, Function, Scene
 from shoal.scene.joints import Joint
 from shoal.trajectory import Status
 
-ROUND_OFF = 1e-12
-"""Of a place, as a part of the machine's size."""
 SINKING = 3000.0
 """A weight that nothing holds yet falls for as long as the error of its rate is below the absolute tolerance; by then
 it is 14 times as fast as that. Twice as much is no error by the default tolerance of energies, a hundredth."""

@@ -39,7 +39,7 @@ USUAL = ("dop853", "leapfrog", "generalized-alpha")
 they are first used."""
 
 
-class Kernel(NamedTuple):
+class KernelSignature(NamedTuple):
     """A kernel by its name, and the types of its arguments."""
 
     name: str
@@ -90,7 +90,7 @@ def warm_for(scenes: Iterable[Scene], lanes: Iterable[int], note: Note) -> None:
     A mark in the cache says that it has been done for the like, so that later runs spend no time on it. Nothing is done
     for a scene that cannot be modelled: its run will say so.
     """
-    wanted: dict[Path, list[Kernel]] = {}
+    wanted: dict[Path, list[KernelSignature]] = {}
     for scene, count in itertools.product(scenes, lanes):
         mark = Path(config.CACHE_DIR) / f"ahead-{_likeness(scene, count)}"
         if not mark.exists():
@@ -111,7 +111,7 @@ def _likeness(scene: Scene, lanes: int) -> str:
     return f"{zlib.crc32(repr(features).encode()):08x}"
 
 
-def ahead(wanted: Iterable[Kernel], note: Note) -> None:
+def ahead(wanted: Iterable[KernelSignature], note: Note) -> None:
     """Compile what is missing in the cache, longest first, in as many processes as there are cores.
 
     Where there can be no processes, as in a worker of Dask, which is a daemon, nothing is done but to say so.
@@ -136,7 +136,7 @@ def ahead(wanted: Iterable[Kernel], note: Note) -> None:
         note(f"  no further processes ({error}): the run compiles what it calls, one after the other")
 
 
-def required(scene: Scene, lanes: int, *, every: bool = False) -> list[Kernel]:
+def required(scene: Scene, lanes: int, *, every: bool = False) -> list[KernelSignature]:
     """Return the large kernels of a run of n lanes; every: also for constraints and families that the scene lacks.
 
     Under `auto` those of its usual choice. Raises InputError if the scene cannot be modelled.
@@ -150,19 +150,23 @@ def required(scene: Scene, lanes: int, *, every: bool = False) -> list[Kernel]:
     room, scheme = work_space(tile, arrays), choose(scene.solver, model, tile, lane, name)
     stops = halting(scene.solver, model, name, scene.solver.duration)
     frame = framed(tile, scheme, arrays, room, 0.0, 0, np.zeros(1), model.marker_rows.ravel(), 0.0, stops)
-    shared = [Kernel(kernel.__name__, kinds) for kernel, kinds in kernels.signatures(tile, arrays, room, every=every)]
+    shared = [
+        KernelSignature(kernel.__name__, kinds) for kernel, kinds in kernels.signatures(tile, arrays, room, every=every)
+    ]
     if lanes > 1 and not every:  # lanes mostly differ in their start alone, and share one stability limit
         shared = [kernel for kernel in shared if kernel.name != "_stiffness"]
     if every and tile == SINGLE:  # statics, modes and reactions
-        shared += [Kernel(kernel.__name__, kinds) for kernel, kinds in evaluations.signatures(tile, arrays, room)]
-    return [Kernel(loop.__name__, (frame_type(frame),)), *shared]
+        shared += [
+            KernelSignature(kernel.__name__, kinds) for kernel, kinds in evaluations.signatures(tile, arrays, room)
+        ]
+    return [KernelSignature(loop.__name__, (frame_type(frame),)), *shared]
 
 
 def _function(name: str) -> Any:
     return loop if name == loop.__name__ else getattr(kernels, name, None) or getattr(evaluations, name)
 
 
-def _compile(kernel: Kernel) -> str:
+def _compile(kernel: KernelSignature) -> str:
     begin = time.perf_counter()
     _function(kernel.name).compile(kernel.kinds)
     return f"{described(*kernel)}: {time.perf_counter() - begin:.1f} s"

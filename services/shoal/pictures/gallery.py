@@ -12,7 +12,7 @@ from shoal.pictures.correlations import correlations, strongest
 from shoal.pictures.drawn import Drawn
 from shoal.pictures.ladder import ladder
 from shoal.pictures.landscape import has_ellipse, landscape, survey
-from shoal.pictures.motion import Motion, motion
+from shoal.pictures.motion import DrawnMotion, motion
 from shoal.pictures.overlay import follows, overlay
 from shoal.pictures.poses import poses
 from shoal.pictures.posterior import posterior, says, shown
@@ -24,12 +24,12 @@ from shoal.pictures.waterfall import waterfall
 from shoal.selection import select
 
 
-def motions(answer: Answer) -> list[Motion]:
+def motions(answer: Answer) -> list[DrawnMotion]:
     """The motion of every recording."""
     return [motion(answer, name) for name in answer.estimate.measurement.recordings]
 
 
-def gallery(answer: Answer, moving: list[Motion]) -> list[Drawn]:
+def gallery(answer: Answer, moving: list[DrawnMotion]) -> list[Drawn]:
     """Every picture that this identification has something to show in."""
     estimate = answer.estimate
     drawn = [_overlay(answer), *(_poses(answer, one) for one in moving[:1]), _residuals(answer)]
@@ -103,7 +103,7 @@ def _overlay(answer: Answer) -> Drawn:
     return Drawn("overlay", figure, alt, f"The fitted model (red-orange) over the data.{grey}")
 
 
-def _poses(answer: Answer, found: Motion) -> Drawn:
+def _poses(answer: Answer, found: DrawnMotion) -> Drawn:
     what = "identified" if answer.estimate.verdict.trusted else "fitted"
     title = titles.ends(f"{answer.problem.name}, {what}", found)
     alt = f"The bodies {', '.join(found.outlines)} at several instants, later ones darker, over the measured places."

@@ -11,7 +11,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from PIL import Image
 
-from shoal.pictures.motion import Motion
+from shoal.pictures.motion import DrawnMotion
 from shoal.pictures.style import BLACK, BLUE, GREY, ORANGE, VERMILION, canvas, headline, styled
 from shoal.pictures.views import views
 
@@ -22,7 +22,7 @@ _SHADES = 12
 
 
 @styled
-def gif(found: Motion, title: str) -> bytes:
+def gif(found: DrawnMotion, title: str) -> bytes:
     """The motion as GIF of sixty frames, slowed down or sped up to about five seconds; in space from a corner."""
     found = found if found.up is None else found.seen(views(found.up)[-1])
     figure, moving, clock = _stage(found, title)
@@ -58,7 +58,7 @@ def _palette() -> Image.Image:
     return found
 
 
-def _stage(found: Motion, title: str) -> tuple[Figure, list[tuple[Any, Any]], Any]:
+def _stage(found: DrawnMotion, title: str) -> tuple[Figure, list[tuple[Any, Any]], Any]:
     """The figure without what moves, the lines that do with their data by frame, and the clock."""
     figure, axes = canvas(1.4 + 5.6 * found.aspect)
     low, high = found.box

@@ -20,7 +20,7 @@ from shoal.mechanics.analysis.equilibrium import Equilibrium
 from shoal.pictures.campbell import campbell
 from shoal.pictures.drawn import Drawn
 from shoal.pictures.engines import engines
-from shoal.pictures.motion import Motion, scene_motion
+from shoal.pictures.motion import DrawnMotion, scene_motion
 from shoal.pictures.overlay import overlay
 from shoal.pictures.pages import render
 from shoal.pictures.paths import paths
@@ -150,6 +150,6 @@ def _html(
 
 def _paths(trajectory: Trajectory) -> Figure:
     markers = {name: trajectory.marker(name) for name in trajectory.markers}
-    moving = Motion("", trajectory.times, np.empty((0, len(trajectory.axes))), {}, markers)
+    moving = DrawnMotion("", trajectory.times, np.empty((0, len(trajectory.axes))), {}, markers)
     name = trajectory.engine
     return paths(moving, reaches(name, moving, trajectory.errors) if trajectory.ok else rejected(name, trajectory))

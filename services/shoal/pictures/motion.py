@@ -11,8 +11,8 @@ import numpy as np
 from shoal.engines.contract import Engine
 from shoal.errors import ComputationError, InputError
 from shoal.pictures.outline import ground, outlined
-from shoal.pictures.solids import Bar, Solids
-from shoal.pictures.views import View, views
+from shoal.pictures.solids import Bar, MarkedScene
+from shoal.pictures.views import ViewDirection, views
 from shoal.scene import Scene
 from shoal.trajectory import Array, plain
 
@@ -23,7 +23,7 @@ _FRAMES = 150
 
 
 @dataclass(frozen=True)
-class Motion:
+class DrawnMotion:
     """One run as the machine's frame sees it; times by the recording's clock [s], (frames,).
 
     name: of the recording or scene; ground: fixed places [m], (places, d)
@@ -78,7 +78,7 @@ class Motion:
         width, height = high - low
         return float(np.clip((height + 0.1 * width) / max(width, 1e-9), 0.3, 0.8))
 
-    def seen(self, view: View) -> Motion:
+    def seen(self, view: ViewDirection) -> DrawnMotion:
         """A motion in space as it is on paper."""
 
         def flat(paths: dict[str, Array]) -> dict[str, Array]:
@@ -103,7 +103,7 @@ class Motion:
         )
 
 
-def scene_motion(scene: Scene, engine: Engine, until: float, frames: int = _FRAMES) -> Motion:
+def scene_motion(scene: Scene, engine: Engine, until: float, frames: int = _FRAMES) -> DrawnMotion:
     """The motion of a scene until a time [s], as far as it can be computed. Raises InputError, ComputationError."""
     if until <= 0:
         raise InputError("out: a motion that is shown lasts longer than 0 s; choose later times with --at")
@@ -115,7 +115,7 @@ def scene_motion(scene: Scene, engine: Engine, until: float, frames: int = _FRAM
         raise ComputationError(f"{scene.name}: there is no motion to show: {seen.message or seen.status[0]}")
     markers = {name: seen.marker(name)[:count] for name in scene.markers}
     shown = read(lambda name: seen.marker(name)[:count])
-    return Motion(scene.name, seen.times[:count], ground(scene), markers=markers, **shown)
+    return DrawnMotion(scene.name, seen.times[:count], ground(scene), markers=markers, **shown)
 
 
 def traced_out(scene: Scene) -> tuple[Scene, Callable[[Callable[[str], Array]], dict[str, Any]]]:
@@ -124,7 +124,7 @@ def traced_out(scene: Scene) -> tuple[Scene, Callable[[Callable[[str], Array]], 
     Places of a marker by its name: [m], (frames, d).
     """
     traced, points = outlined(scene)
-    solids = Solids(traced, points, scene) if scene.dimensions == 3 else None
+    solids = MarkedScene(traced, points, scene) if scene.dimensions == 3 else None
 
     def read(at: Callable[[str], Array]) -> dict[str, Any]:
         outlines = {body: np.stack([at(name) for name in names], axis=1) for body, names in points.items()}
@@ -144,7 +144,7 @@ def upwards(scene: Scene) -> Array:
     return way
 
 
-def motion(answer: Answer, recording: str, frames: int = _FRAMES) -> Motion:
+def motion(answer: Answer, recording: str, frames: int = _FRAMES) -> DrawnMotion:
     """The motion that was identified, over what a recording shows. Raises InputError."""
     view = answer.view(recording)
     samples = answer.estimate.measurement.recordings[recording]
@@ -169,7 +169,7 @@ def motion(answer: Answer, recording: str, frames: int = _FRAMES) -> Motion:
     directions = {m: found["angle"] + view["tilt"] for m, found in places.items() if "angle" in found}
     fixed = ground(scene)
     shown = read(seen.marker)
-    return Motion(recording, times, fixed, markers=markers, measured=measured, directions=directions, **shown)
+    return DrawnMotion(recording, times, fixed, markers=markers, measured=measured, directions=directions, **shown)
 
 
 def _step(times: Array) -> float:
@@ -184,7 +184,7 @@ def _place(found: dict[str, Array], view: dict[str, float]) -> Array:
     return np.stack([view["x"] + c * x - s * y, view["y"] + s * x + c * y, *depth], axis=1)
 
 
-def plain_motion(found: Motion) -> dict[str, Any]:
+def plain_motion(found: DrawnMotion) -> dict[str, Any]:
     """Return plain numbers for a script in a page, rounded to a ten-thousandth of the machine's size."""
     (low, high), size = found.box, found.size
     digits = max(0, 4 - int(np.floor(np.log10(size)))) if size > 0 else 6
@@ -203,7 +203,7 @@ def plain_motion(found: Motion) -> dict[str, Any]:
     }
 
 
-def _plain_space(found: Motion, digits: int) -> dict[str, Any]:
+def _plain_space(found: DrawnMotion, digits: int) -> dict[str, Any]:
     bars = {
         name: {
             # Otherwise it is the outline.

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from shoal.identification import Estimate
 from shoal.pictures.numbers import handy
-from shoal.pictures.signals import LONG, Signal, gaps, signals, worst
+from shoal.pictures.signals import LONG, FittedSignal, gaps, signals, worst
 from shoal.pictures.style import BLACK, SKY, VERMILION, canvas, headline, styled
 
 _PANELS = 6
@@ -55,7 +55,7 @@ def follows(estimate: Estimate) -> str:
     return f"the model {how} {' and '.join(parts)} (RMS)"
 
 
-def _draw(panel: Axes, signal: Signal, gap: str) -> None:
+def _draw(panel: Axes, signal: FittedSignal, gap: str) -> None:
     many = len(signal.times) > _MANY
     for k, (begin, end) in enumerate(gaps(signal)):
         panel.axvspan(begin, end, color="#EEEEEE", zorder=0, label=gap if k == 0 else None)

@@ -9,7 +9,7 @@ from typing import Any
 from jinja2 import BaseLoader, ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from shoal.pictures.motion import Motion, plain_motion
+from shoal.pictures.motion import DrawnMotion, plain_motion
 from shoal.pictures.views import views
 from shoal.versions import versions
 
@@ -45,7 +45,7 @@ def render(template: str, **content: Any) -> str:
     return environment().get_template(template).render(**content)
 
 
-def animation(found: Motion, what: str) -> dict[str, Any]:
+def animation(found: DrawnMotion, what: str) -> dict[str, Any]:
     """Return the arguments of the macro `animation`; what: the machine in words."""
     shown = [f"{what} (blue) with its markers (red-orange)"]
     if found.measured:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from shoal.pictures.motion import Motion
+from shoal.pictures.motion import DrawnMotion
 from shoal.pictures.style import LINES, canvas, headline, styled
 from shoal.trajectory import Array
 
@@ -13,7 +13,7 @@ _MOST = 6
 
 
 @styled
-def paths(found: Motion, title: str) -> Figure:
+def paths(found: DrawnMotion, title: str) -> Figure:
     """x above, y below it, in space z below them, a line for each of at most six paths."""
     axes = "xyz"[: found.ground.shape[1]]
     figure, panels = canvas(1.4 + 1.8 * len(axes), nrows=len(axes), sharex=True)
@@ -31,7 +31,7 @@ def paths(found: Motion, title: str) -> Figure:
     return figure
 
 
-def _lines(found: Motion) -> list[tuple[str, Array]]:
+def _lines(found: DrawnMotion) -> list[tuple[str, Array]]:
     """The paths of the markers by name; markers that are in one place all the time share a path."""
     groups: list[tuple[list[str], Array]] = []
     for marker, path in found.markers.items():

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
-from shoal.pictures.motion import Motion
+from shoal.pictures.motion import DrawnMotion
 from shoal.pictures.style import BLACK, BLUE, GREY, ORANGE, VERMILION, canvas, headline, styled
 from shoal.pictures.views import views
 
@@ -18,7 +18,7 @@ _HALO = [withStroke(linewidth=3, foreground="white")]
 
 
 @styled
-def poses(found: Motion, title: str, way: str = "paths of the markers") -> Figure:
+def poses(found: DrawnMotion, title: str, way: str = "paths of the markers") -> Figure:
     """The machine at a few instants, the later the darker, the paths of its markers, and the measured places.
 
     A machine in space from the front, from above it, from its right, as on a drawing, and from a corner.
@@ -41,7 +41,7 @@ def poses(found: Motion, title: str, way: str = "paths of the markers") -> Figur
     return figure
 
 
-def _frame(axes: Axes, seen: Motion, half: float, name: str) -> None:
+def _frame(axes: Axes, seen: DrawnMotion, half: float, name: str) -> None:
     """So wide [m] to each side that all views along an axis have one scale."""
     middle = np.mean(seen.box, axis=0)
     half = half if all(seen.labels) else 0.55 * seen.size
@@ -55,7 +55,7 @@ def _frame(axes: Axes, seen: Motion, half: float, name: str) -> None:
         axes.spines[:].set_visible(False)
 
 
-def _draw(axes: Axes, found: Motion, way: str) -> None:
+def _draw(axes: Axes, found: DrawnMotion, way: str) -> None:
     count = min(_POSES, len(found.times))
     chosen = np.linspace(0, len(found.times) - 1, count).round().astype(int)
     for number, k in enumerate(chosen):
@@ -76,7 +76,7 @@ def _draw(axes: Axes, found: Motion, way: str) -> None:
     axes.set_ylabel(found.labels[1])
 
 
-def _names(axes: Axes, found: Motion) -> None:
+def _names(axes: Axes, found: DrawnMotion) -> None:
     """The names of the markers where they end; those in one place stand in one line."""
     low, high = found.box
     places: dict[tuple[int, ...], list[str]] = {}
@@ -89,7 +89,7 @@ def _names(axes: Axes, found: Motion) -> None:
         )
 
 
-def _directions(axes: Axes, found: Motion, chosen: np.ndarray[tuple[int], np.dtype[np.int_]]) -> None:
+def _directions(axes: Axes, found: DrawnMotion, chosen: np.ndarray[tuple[int], np.dtype[np.int_]]) -> None:
     """Measured angles as short lines from their markers."""
     low, high = found.box
     length = 0.08 * float(np.max(high - low))

@@ -10,7 +10,7 @@ from shoal.pictures import units
 from shoal.pictures.answer import Answer
 from shoal.pictures.drawn import Drawn
 from shoal.pictures.gallery import gallery, motions
-from shoal.pictures.motion import Motion
+from shoal.pictures.motion import DrawnMotion
 from shoal.pictures.numbers import length, power, rounded
 from shoal.pictures.overlay import follows
 from shoal.pictures.pages import animation, render, settings, software
@@ -19,7 +19,7 @@ _ENDS = 5
 """Ends of other searches that are listed."""
 
 
-def report(answer: Answer, moving: list[Motion] | None = None, drawn: list[Drawn] | None = None) -> str:
+def report(answer: Answer, moving: list[DrawnMotion] | None = None, drawn: list[Drawn] | None = None) -> str:
     """The page as HTML without a reference to anything outside. Raises InputError."""
     return render(
         "estimate.html.j2",
@@ -31,7 +31,9 @@ def report(answer: Answer, moving: list[Motion] | None = None, drawn: list[Drawn
     )
 
 
-def findings(answer: Answer, moving: list[Motion] | None = None, drawn: list[Drawn] | None = None) -> dict[str, Any]:
+def findings(
+    answer: Answer, moving: list[DrawnMotion] | None = None, drawn: list[Drawn] | None = None
+) -> dict[str, Any]:
     """Return the data of findings.html.j2: answer, motion and evidence. Raises InputError."""
     moving = motions(answer) if moving is None else moving
     drawn = gallery(answer, moving) if drawn is None else drawn
@@ -41,7 +43,7 @@ def findings(answer: Answer, moving: list[Motion] | None = None, drawn: list[Dra
         "answer_title": "The answer" if estimate.verdict.trusted else "Numbers that are no answer",
         "headings": ["parameter", "value", "standard deviation (noise)", "95 % interval", "known", *truth],
         "rows": _rows(answer),
-        "reasons": [_sentence(reason) for reason in estimate.message.split("; ") if reason],
+        "reasons": [_sentence(one.text) for one in estimate.findings],
         "remarks": _remarks(estimate),
         "motions": [animation(one, _machine(answer, one)) for one in moving],
         "pictures": [one.embedded() for one in drawn],
@@ -129,7 +131,7 @@ def _remarks(estimate: Estimate) -> list[str]:
     return remarks
 
 
-def _machine(answer: Answer, one: Motion) -> str:
+def _machine(answer: Answer, one: DrawnMotion) -> str:
     machine = "identified machine" if answer.estimate.verdict.trusted else "fitted machine"
     return f"Recording {one.name}: the {machine}" if len(answer.estimate.scenes) > 1 else f"The {machine}"
 

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from shoal.identification import Estimate
 from shoal.pictures.numbers import handy
-from shoal.pictures.signals import Signal, signals, worst
+from shoal.pictures.signals import FittedSignal, signals, worst
 from shoal.pictures.style import BLACK, BLUE, ORANGE, canvas, headline, styled
 from shoal.trajectory import Array
 
@@ -59,16 +59,16 @@ def white(estimate: Estimate) -> str:
     return f"correlation of the residuals: {found} ({100 * outside / max(lags, 1):.0f} % of lags outside the band)"
 
 
-def _outside(signal: Signal) -> tuple[int, int]:
+def _outside(signal: FittedSignal) -> tuple[int, int]:
     found = autocorrelation(signal.residual)[1:]
     return int(np.sum(np.abs(found) > _band(signal))), len(found)
 
 
-def _band(signal: Signal) -> float:
+def _band(signal: FittedSignal) -> float:
     return NORMAL_95 / float(np.sqrt(max(1, np.isfinite(signal.residual).sum())))
 
 
-def _against_time(panel: Axes, signal: Signal) -> None:
+def _against_time(panel: Axes, signal: FittedSignal) -> None:
     known = signal.residual[np.isfinite(signal.residual)]
     factor, unit = handy(float(np.max(np.abs(known), initial=0.0)), signal.unit)
     if np.isfinite(signal.noise):
@@ -81,7 +81,7 @@ def _against_time(panel: Axes, signal: Signal) -> None:
     panel.set_ylabel(f"{signal.name}\n[{unit}]")
 
 
-def _against_lag(panel: Axes, signal: Signal) -> None:
+def _against_lag(panel: Axes, signal: FittedSignal) -> None:
     found = autocorrelation(signal.residual)
     lags = np.arange(1, len(found))
     panel.axhspan(

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
+from shoal.mechanics.affine import points
 from shoal.mechanics.analysis.equilibrium import Equilibrium
-from shoal.mechanics.analysis.evaluate import points
 from shoal.mechanics.machine import Machine
 from shoal.mechanics.numerics.tile import stacked
-from shoal.pictures.motion import Motion, traced_out
+from shoal.pictures.motion import DrawnMotion, traced_out
 from shoal.pictures.numbers import length
 from shoal.pictures.outline import ground
 from shoal.pictures.poses import poses
@@ -31,7 +31,7 @@ def rest(found: Equilibrium) -> Figure:
     return poses(rest_motion(found), title, "from the start to the place of rest")
 
 
-def rest_motion(found: Equilibrium) -> Motion:
+def rest_motion(found: Equilibrium) -> DrawnMotion:
     """Two frames: the start and the equilibrium."""
     traced, read = traced_out(found.scene)
     placement = Machine.of(traced).placement
@@ -44,4 +44,4 @@ def rest_motion(found: Equilibrium) -> Motion:
         return np.asarray(seen[numbers[name]])
 
     markers = {name: at(name) for name in found.scene.markers}
-    return Motion(found.scene.name, np.array([0.0, 1.0]), ground(found.scene), markers=markers, **read(at))
+    return DrawnMotion(found.scene.name, np.array([0.0, 1.0]), ground(found.scene), markers=markers, **read(at))

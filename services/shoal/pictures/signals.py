@@ -18,7 +18,7 @@ LONG = 1.9
 
 
 @dataclass(frozen=True)
-class Signal:
+class FittedSignal:
     """One channel of one recording: times by its clock [s], measured (nan in gaps) and fitted values, all (samples,).
 
     noise: standard deviation as stated, else estimated from differences of the data
@@ -57,7 +57,7 @@ class Signal:
         return self.rms / max(size, 1e-300)
 
 
-def signals(estimate: Estimate) -> list[Signal]:
+def signals(estimate: Estimate) -> list[FittedSignal]:
     """Every channel of every recording, in their order."""
     recordings = estimate.measurement.recordings
     found = []
@@ -66,7 +66,7 @@ def signals(estimate: Estimate) -> list[Signal]:
         for k, channel in enumerate(recording.channels):
             what = channel.name
             found.append(
-                Signal(
+                FittedSignal(
                     f"{name}: {what}" if len(recordings) > 1 else what,
                     name,
                     channel,
@@ -80,7 +80,7 @@ def signals(estimate: Estimate) -> list[Signal]:
     return found
 
 
-def worst(found: Sequence[Signal], most: int) -> list[Signal]:
+def worst(found: Sequence[FittedSignal], most: int) -> list[FittedSignal]:
     """At most `most` signals, those with the largest misfit, in their order."""
     chosen = sorted(range(len(found)), key=lambda k: -found[k].misfit)[:most]
     return [found[k] for k in sorted(chosen)]
@@ -91,7 +91,7 @@ def residuals(estimate: Estimate) -> dict[str, Array]:
     return {name: estimate.predicted[name] - r.values for name, r in estimate.measurement.recordings.items()}
 
 
-def gaps(signal: Signal) -> list[tuple[float, float]]:
+def gaps(signal: FittedSignal) -> list[tuple[float, float]]:
     """Intervals of time [s] in which nothing was measured: samples without a value, and steps far above the usual."""
     known = signal.times[np.isfinite(signal.measured)]
     if len(known) < 2:

@@ -11,7 +11,7 @@ from shoal.pictures.choice import rows, tells_places, why
 from shoal.pictures.drawn import Drawn
 from shoal.pictures.estimates import budget, estimates, grade
 from shoal.pictures.ladder import ladder
-from shoal.pictures.motion import Motion, scene_motion
+from shoal.pictures.motion import DrawnMotion, scene_motion
 from shoal.pictures.numbers import length
 from shoal.pictures.pages import animation, render, settings, software
 from shoal.pictures.paths import paths
@@ -31,7 +31,7 @@ def simulation(trajectory: Trajectory, scene: Scene, selection: Selection | None
     return page(trajectory, scene, moving, drawn(trajectory, scene, moving, selection), selection)
 
 
-def drawn(trajectory: Trajectory, scene: Scene, moving: Motion, selection: Selection | None = None) -> list[Drawn]:
+def drawn(trajectory: Trajectory, scene: Scene, moving: DrawnMotion, selection: Selection | None = None) -> list[Drawn]:
     """Draw the pictures of the page: poses, paths and, of a chosen model, the candidates."""
     pictures = [_poses(trajectory, scene, moving), _paths(trajectory, scene, moving)]
     if selection is not None:
@@ -44,7 +44,7 @@ def drawn(trajectory: Trajectory, scene: Scene, moving: Motion, selection: Selec
 
 
 def page(
-    trajectory: Trajectory, scene: Scene, moving: Motion, pictures: list[Drawn], selection: Selection | None = None
+    trajectory: Trajectory, scene: Scene, moving: DrawnMotion, pictures: list[Drawn], selection: Selection | None = None
 ) -> str:
     """The page of a run whose motion and pictures are at hand."""
     return render(
@@ -72,7 +72,7 @@ def _remarks(trajectory: Trajectory, selection: Selection | None) -> list[str]:
     return [f"{one[0].upper()}{one[1:]}." for one in estimates(trajectory)]
 
 
-def moved(trajectory: Trajectory, scene: Scene) -> Motion:
+def moved(trajectory: Trajectory, scene: Scene) -> DrawnMotion:
     """The same run with the outlines of its bodies. Raises InputError, ComputationError."""
     return scene_motion(scene, get_engine(trajectory.engine), float(trajectory.times[-1]))
 
@@ -97,7 +97,7 @@ def _end(trajectory: Trajectory, name: str) -> list[str]:
     return [f"{x:.6f}" for x in numbers]
 
 
-def _poses(trajectory: Trajectory, scene: Scene, moving: Motion) -> Drawn:
+def _poses(trajectory: Trajectory, scene: Scene, moving: DrawnMotion) -> Drawn:
     until = f"until {moving.times[-1]:.3g} s"
     alt = f"The bodies {', '.join(moving.outlines)} at several instants {until}, later ones darker."
     colour = "red-orange " if moving.up is not None else ""
@@ -111,7 +111,7 @@ def _poses(trajectory: Trajectory, scene: Scene, moving: Motion) -> Drawn:
     )
 
 
-def _paths(trajectory: Trajectory, scene: Scene, moving: Motion) -> Drawn:
+def _paths(trajectory: Trajectory, scene: Scene, moving: DrawnMotion) -> Drawn:
     reach = {name: float(np.max(np.ptp(path, axis=0))) for name, path in moving.markers.items()}
     moves = ", ".join(f"{name} moves within {length(size)}" for name, size in reach.items())
     words = moves if trajectory.ok else "not to be trusted"

@@ -49,7 +49,7 @@ class Bar:
         return np.concatenate([part for line in (*corners, *rings) for part in (line, gap)], axis=1)
 
 
-class Solids:
+class MarkedScene:
     """The scene with markers at bars, joints and axes.
 
     Markers do not change a model: bodies have their coordinates from joints.

@@ -9,7 +9,7 @@ import numpy as np
 from shoal.engines.compare import Comparison
 from shoal.error_budget import ErrorBudget
 from shoal.identification import Estimate
-from shoal.pictures.motion import Motion
+from shoal.pictures.motion import DrawnMotion
 from shoal.pictures.numbers import length
 from shoal.trajectory import Trajectory
 
@@ -48,7 +48,7 @@ def refines(name: str, estimates: Mapping[str, Estimate]) -> str:
     return f"{name}: {labels[0]} is off by {first:.2g}°, {labels[-1]} by {last:.2g}°"
 
 
-def ends(name: str, found: Motion, errors: ErrorBudget | None = None) -> str:
+def ends(name: str, found: DrawnMotion, errors: ErrorBudget | None = None) -> str:
     """Return the final position of the last marker, and its known error."""
     marker, path = list(found.markers.items())[-1]
     place = f"({', '.join(f'{x:.3g}' for x in path[-1])})".replace("-", "−")
@@ -60,7 +60,7 @@ def rejected(name: str, trajectory: Trajectory) -> str:
     return f"{name}: not to be trusted ({trajectory.status[0]})"
 
 
-def reaches(name: str, found: Motion, errors: ErrorBudget | None = None) -> str:
+def reaches(name: str, found: DrawnMotion, errors: ErrorBudget | None = None) -> str:
     """Return the range of the marker that moves most."""
     spans = {marker: np.ptp(path, axis=0) for marker, path in found.markers.items()}
     marker = max(spans, key=lambda one: float(np.max(spans[one])))

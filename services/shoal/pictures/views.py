@@ -10,7 +10,7 @@ from shoal.trajectory import Array
 
 
 @dataclass(frozen=True)
-class View:
+class ViewDirection:
     """A way to look, turned from the front by a yaw about the upward direction and a pitch downwards [rad].
 
     right, up: unit vectors of the directions that point to the right and up on the paper, (3,) each.
@@ -33,7 +33,7 @@ class View:
         return _label(self.right), _label(self.up)
 
 
-def views(up: Array) -> tuple[View, View, View, View]:
+def views(up: Array) -> tuple[ViewDirection, ViewDirection, ViewDirection, ViewDirection]:
     """Front, top, right side and corner; up: the direction against gravity, along an axis, (3,)."""
     return (
         _view("front", up, 0.0, 0.0),
@@ -43,13 +43,13 @@ def views(up: Array) -> tuple[View, View, View, View]:
     )
 
 
-def _view(name: str, up: Array, *degrees: float) -> View:
+def _view(name: str, up: Array, *degrees: float) -> ViewDirection:
     yaw, pitch = np.radians(degrees)
     # In front x points to the right, or y where x is up.
     right = np.eye(3)[1 if abs(up[0]) > 0.5 else 0]
     aside = np.cos(yaw) * right + np.sin(yaw) * np.cross(right, up)
     towards = np.cos(pitch) * np.cross(aside, up) + np.sin(pitch) * up
-    return View(name, float(yaw), float(pitch), aside, np.cross(towards, aside))
+    return ViewDirection(name, float(yaw), float(pitch), aside, np.cross(towards, aside))
 
 
 def _label(way: Array) -> str:

@@ -19,7 +19,7 @@ from scipy import optimize
 from shoal.errors import ComputationError, InputError
 from shoal.response.inputs import Inputs, Parameter
 from shoal.response.marginals import scaled
-from shoal.response.runs import Model, Runs
+from shoal.response.runs import CachedModel, Model
 from shoal.scene import Scene
 from shoal.trajectory import Array, plain
 
@@ -236,7 +236,7 @@ def _pull(model: Model, inputs: Inputs, germ: Array, factors: Array) -> tuple[Ar
 
     The worst place moves outwards with the tolerance: d margin / d germ * germ / factor.
     """
-    runs = Runs(model, inputs, 2 * len(germ) + 1)
+    runs = CachedModel(model, inputs, 2 * len(germ) + 1)
     away = STEP * np.eye(len(germ))
     runs.all(np.concatenate([germ[None], germ + away, germ - away]))
     values = runs.values

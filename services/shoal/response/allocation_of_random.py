@@ -30,7 +30,7 @@ from shoal.response.between import GAP, MORE, PLACES, between
 from shoal.response.inputs import Inputs
 from shoal.response.limits import MOST, Judged, Limit
 from shoal.response.limits.choice import probability
-from shoal.response.limits.estimate import Estimate
+from shoal.response.limits.estimate import ExceedanceEstimate
 from shoal.response.limits.form import design_points
 from shoal.response.limits.inverse import Nearest, nearest
 from shoal.response.limits.judge import watched
@@ -134,7 +134,7 @@ class Confirmed:
     """What a study tells with these factors. doubt: why it should not be believed, empty if it may be."""
 
     factors: Array
-    estimate: Estimate
+    estimate: ExceedanceEstimate
     doubt: str
 
     @property

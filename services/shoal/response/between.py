@@ -24,7 +24,7 @@ from shoal.response.limits.margins import FAR, Margins
 from shoal.response.machine import Machine
 from shoal.response.methods.nested import best
 from shoal.response.respond import Answer, respond
-from shoal.response.runs import Answers, Runs
+from shoal.response.runs import Answers, CachedModel
 from shoal.response.study import Study
 from shoal.trajectory import Array
 
@@ -106,7 +106,7 @@ def searched(
     return answer, made, failed
 
 
-def _beyond(runs: Runs, seed: int) -> tuple[float, float]:
+def _beyond(runs: CachedModel, seed: int) -> tuple[float, float]:
     """By how much the index may be above the largest one that is known, and below the least.
 
     Indices are known to the scatter of few runs: of all polynomials the one that foretells left-out ones best tells. Of

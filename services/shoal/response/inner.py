@@ -20,7 +20,7 @@ from shoal.response.kept import TimeIsUpError
 from shoal.response.methods.bounds import bounds
 from shoal.response.methods.quadrature import rule
 from shoal.response.polynomials import size, total_degree
-from shoal.response.runs import Answers, Runs, TooManyRunsError
+from shoal.response.runs import Answers, CachedModel, TooManyRunsError
 from shoal.response.study import Study
 from shoal.trajectory import Array
 
@@ -167,7 +167,7 @@ def _bounded(study: Study, columns: IntArray, spared: int) -> tuple[Ends, Ends, 
     apart = inner.settle(intervals.values(tried), (study.runs.left - spared) // SHARE)
     if apart is None or inner.rule is None:
         raise TooManyRunsError
-    runs = Runs(inner, intervals, (study.runs.left - spared) // len(inner.rule.germs))
+    runs = CachedModel(inner, intervals, (study.runs.left - spared) // len(inner.rule.germs))
     # The variance is smooth where the deviation has a kink.
     groups = np.concatenate([study.groups[columns], study.groups[columns] + study.groups.max() + 1])
     outer = Study(runs, groups, np.tile(study.instants[columns], 2), study.seed, GAP)

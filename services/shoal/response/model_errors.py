@@ -18,7 +18,7 @@ from shoal.error_budget import ErrorBudget, worst
 from shoal.response.boxes import Boxes, Ends
 from shoal.response.machine import Machine, stable
 from shoal.response.result import Bounds
-from shoal.response.runs import Runs
+from shoal.response.runs import CachedModel
 from shoal.response.statistics import Statistics
 from shoal.trajectory import Array
 
@@ -67,7 +67,7 @@ def unestimated(machine: Machine) -> ModelErrors:
     return ModelErrors(ErrorBudget(), np.zeros(int(np.prod(machine.columns))))
 
 
-def model_errors(machine: Machine, runs: Runs, chosen: Sequence[int]) -> ModelErrors:
+def model_errors(machine: Machine, runs: CachedModel, chosen: Sequence[int]) -> ModelErrors:
     """Return the largest errors of some runs of a study. chosen: their numbers. Raises InputError."""
     found = unestimated(machine)
     for run in chosen:

@@ -18,10 +18,10 @@ from shoal.response.inputs import Inputs
 from shoal.response.kept import TimeIsUpError
 from shoal.response.methods import get_method
 from shoal.response.result import Bounds
-from shoal.response.runs import Model, Runs, TooManyRunsError
+from shoal.response.runs import CachedModel, Model, TooManyRunsError
 from shoal.response.statistics import DRAWN as PLACES
 from shoal.response.statistics import QUANTILES, Statistics, either, masked, of_expansion, of_runs
-from shoal.response.study import Found, Linked, Study
+from shoal.response.study import Found, LinkedMoments, Study
 from shoal.trajectory import Array
 
 MIXED = "auto", "nested"
@@ -35,7 +35,7 @@ class Answer:
     """What is found of any model: bounds or statistics of its columns, and how."""
 
     found: Found
-    runs: Runs
+    runs: CachedModel
     bounds: Bounds | None
     statistics: Statistics | None
     boxes: Boxes | None = None
@@ -81,7 +81,7 @@ def respond(
         raise InputError(
             f"vary: method {method} takes intervals or distributions, not both; methods for both are {', '.join(MIXED)}"
         )
-    runs = Runs(model, inputs, most, progress)
+    runs = CachedModel(model, inputs, most, progress)
     group = np.arange(columns) if groups is None else np.asarray(groups, dtype=np.int64)
     when = np.zeros(columns) if instants is None else instants
     study = Study(runs, group, when, seed, gap, degree, count, over_time)
@@ -110,7 +110,7 @@ def respond(
     return Answer(found, runs, bounds, statistics, boxes)
 
 
-def _broken_off(runs: Runs) -> Found:
+def _broken_off(runs: CachedModel) -> Found:
     """What is known when the time is up. Raises TimeIsUpError if that is nothing."""
     if runs.evaluations == 0:
         raise TimeIsUpError
@@ -134,7 +134,7 @@ def _statistics(study: Study, found: Found) -> Statistics:
     return masked(told, study.largest(np.nan_to_num(told.std), runs.values))
 
 
-def _over(told: Statistics, linked: Linked, study: Study) -> Statistics:
+def _over(told: Statistics, linked: LinkedMoments, study: Study) -> Statistics:
     """With those of the columns that something else than the expansion tells."""
     quantiles, first, total = told.quantiles.copy(), told.first.copy(), told.total.copy()
     for columns, link in linked.links:

@@ -99,7 +99,7 @@ class Response:
     @property
     def mixes_starts(self) -> str:
         """That some runs start elsewhere than stated, in words; empty if none does."""
-        return "" if self.elsewhere is None else self.elsewhere.told()
+        return "" if self.elsewhere is None else self.elsewhere.describe()
 
     @property
     def mesh_error(self) -> float | None:

@@ -38,7 +38,7 @@ class TooManyRunsError(Exception):
 
 
 @dataclass
-class Runs:
+class CachedModel:
     """A model with a memory: call it with germs.
 
     most: runs that it may make; progress: is told after every call how many there are; controls: runs all over the box
@@ -106,10 +106,10 @@ class Runs:
         self.aside, self.why = self.evaluations, ""
         self._germs, self._values, self._good = [], [], []
 
-    def part(self, which: BoolArray) -> Runs:
+    def part(self, which: BoolArray) -> CachedModel:
         """Some of the good runs, (runs,), for fits to fewer of them."""
         germs, values = self.germs[which], self.values[which]
-        return Runs(
+        return CachedModel(
             self.model, self.inputs, self.most, None, 0, "", [germs], [values], [np.ones(len(germs), dtype=bool)]
         )
 

@@ -13,7 +13,7 @@ from shoal.errors import InputError
 from shoal.response.extremes import Surrogate
 from shoal.response.inputs import BoolArray, Inputs, IntArray
 from shoal.response.polynomials import size
-from shoal.response.runs import Model, Runs
+from shoal.response.runs import CachedModel, Model
 from shoal.trajectory import Array
 
 FINE_GAP = 1e-6
@@ -38,7 +38,7 @@ class Study:
     where there is one; then the columns of the study are (instants, signals) too
     """
 
-    runs: Runs
+    runs: CachedModel
     groups: IntArray
     instants: Array
     seed: int = 0
@@ -113,7 +113,7 @@ class Other(Protocol):
         ...
 
 
-class Linked(Protocol):
+class LinkedMoments(Protocol):
     """Moments of all columns, and what tells some of them better than an expansion."""
 
     @property
@@ -173,7 +173,7 @@ class Found:
     share: float = 0.0
     quantiles: Array | None = None
     errors: tuple[Array, Array] | None = None
-    linked: Linked | None = None
+    linked: LinkedMoments | None = None
     looked: Looked | None = None
     drawn: int | None = None
 

@@ -1,4 +1,4 @@
-"""Bodies: a rod, whose element decides how much of it is modelled, and those of `solids`."""
+"""Bodies of a scene: rods, whose element chooses the beam theory and the discretisation, and those of `solids`."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ _ONLY_FLEXIBLE = {
     "ends": None,
     "retardation": 0.0,
 }
-"""Fields that a rigid rod has no use for, and what they are where nobody states them."""
+"""Fields of flexible rods alone, with their default values."""
 
 
 @cache
@@ -55,55 +55,75 @@ def _gauss(points: int) -> tuple[tuple[float, float], ...]:
 
 
 class Rod(Record):
-    """A homogeneous rod that starts at its body's origin along the x axis.
-
-    Lengths in m, density in kg/m^3, moduli in Pa. `height` is the thickness in the plane of motion, of a `section` that
-    is round or a tube its outer diameter; `width`, `wall` (of a tube), `web` and `flange` (thicknesses, of an i-beam)
-    are stated where the section has them. `element` is the model of the rod, with `elements` elements of equal length:
-    `rigid`, `ancf-cable` (cubic, Bernoulli-Euler), `ancf-quintic` (the same of higher order), `simo-reissner` (with
-    shear) or `ancf-full` (with shear and stretch of the section). `rigid` where nothing else is stated that only a
-    flexible rod has. `rotary_inertia`: whether the height of a rigid rod counts in its inertia: not in the paper, in
-    cables and quintic elements, but always in simo-reissner and ancf-full. `quadrature` of a cable is `full` (Gauss, 5
-    points axial and 3 bending) or `reduced` (3 Lobatto points axial, 2 Gauss points bending). `law` is that of
-    ancf-full. `curvature` [1/m, 1/m^2, ...]: polynomial of the curvature of the unstrained axis over its arc length.
-    `end_height`, `end_width`: those at the far end of a tapered rod, along which they change evenly (each element has
-    the section of its middle). `retardation` [s]: Kelvin-Voigt damping, stress E (strain + retardation * strain rate).
-    In space `director-rod` bends about both axes of its section and twists; `torsion_constant` [m^4] overrides that of
-    the section, `side_curvature` [1/m, ...] bends the unstrained axis towards its local z axis and `twist` [rad/m, ...]
-    turns its sections, both polynomials over the arc length. `director`: the axis of the section that its nodes carry,
-    by default the one that a joint can share.
-    `modal` bends little in a frame that moves with it, in the plane, by `modes` eigenmodes of a uniform rod
-    whose `ends` are held in that frame as the joints hold them, or as stated. It stretches by `axial_modes`
-    shapes: evenly, then the same eigenmodes taken along it.
-    """
+    """A homogeneous rod that starts at its body's origin along the x axis."""
 
     kind: Literal["rod"] = "rod"
     length: Positive
+    """Length of the axis [m]."""
     height: Positive
+    """Thickness in the plane of motion, along the local y axis; of a `round` or `tube` section its outer diameter [m].
+    """
     width: Positive | None = None
+    """Thickness along the local z axis [m]; for sections `rectangle` and `i-beam`."""
     section: SectionName = "rectangle"
+    """Shape of the section."""
     wall: Positive | None = None
+    """Thickness of the wall of a tube [m]."""
     web: Positive | None = None
+    """Thickness of the web of an I-beam [m]."""
     flange: Positive | None = None
+    """Thickness of the flanges of an I-beam [m]."""
     density: Positive
+    """Mass density [kg/m^3]."""
     youngs_modulus: Positive | None = None
+    """Young's modulus of a flexible rod [Pa]."""
     poisson_ratio: Annotated[float, Field(gt=-1, le=0.5)] = 0.3
+    """Poisson's ratio [1]."""
     element: Element = "rigid"
+    """Model of the rod: rigid; `ancf-cable` (cubic, Bernoulli-Euler) or `ancf-quintic` (the same of higher order);
+    `simo-reissner` (with shear); `ancf-full` (with shear and stretch of the section); `director-rod` (bends about both
+    axes and twists, in space); `modal` (eigenmodes in a floating frame, in the plane). To be stated where a field of
+    flexible rods is.
+    """
     elements: Annotated[int, Field(ge=1, le=10_000)] = 1
+    """Number of elements of equal length."""
     modes: Annotated[int, Field(ge=1, le=200)] = 4
+    """Number of bending eigenmodes of a modal rod."""
     axial_modes: Annotated[int, Field(ge=0, le=201)] = 0
+    """Number of axial shapes of a modal rod: an even stretch, then the shapes of the bending modes; at most `modes` +
+    1.
+    """
     ends: tuple[End, End] | None = None
+    """How the ends of a modal rod are held in its frame; by default as the joints hold them."""
     quadrature: Quadrature = "full"
+    """Integration of ancf-cable: `full` (Gauss, 5 points axial and 3 bending) or `reduced` (3 Lobatto points axial, 2
+    Gauss points bending).
+    """
     law: Law = "plane-stress"
+    """Material law of ancf-full."""
     curvature: tuple[float, ...] = ()
+    """Curvature of the unstrained axis in the local x-y plane, coefficients of a polynomial of the arc length [1/m,
+    1/m^2, ...].
+    """
     side_curvature: tuple[float, ...] = ()
+    """Curvature of the unstrained axis of a director rod towards local z, as `curvature` [1/m, 1/m^2, ...]."""
     twist: tuple[float, ...] = ()
+    """Twist of the unstrained sections of a director rod, as `curvature` [rad/m, rad/m^2, ...]."""
     end_height: Positive | None = None
+    """Height at the far end of a tapered rod [m]; it changes linearly, and each element has the section of its middle.
+    """
     end_width: Positive | None = None
+    """Width at the far end of a tapered rod [m]."""
     retardation: NonNegative = 0.0
+    """Kelvin-Voigt damping: stress is E (strain + retardation * strain rate) [s]."""
     torsion_constant: Positive | None = None
+    """Torsion constant of a director rod [m^4]; by default that of the section."""
     director: Literal["y", "z"] | None = None
+    """Axis of the section that the nodes of a director rod carry; by default one that a joint can share."""
     rotary_inertia: bool = False
+    """Whether a rigid or modal rod has the rotary inertia of its sections; simo-reissner and ancf-full always have it,
+    ancf-cable and ancf-quintic never.
+    """
     limiting: ClassVar[tuple[str, ...]] = (
         *("length", "height", "width", "wall", "web", "flange"),
         *("end_height", "end_width", "twist"),
@@ -150,7 +170,7 @@ class Rod(Record):
         return self
 
     @model_validator(mode="after")
-    def _section_is_told(self) -> Rod:
+    def _section_is_defined(self) -> Rod:
         needs = SECTIONS[self.section].needs
         for field in ("width", "wall", "web", "flange"):
             if (getattr(self, field) is None) == (field in needs):

@@ -1,10 +1,11 @@
-"""Breakpoints of an expression (jumps and kinks), exactly, and the smooth expressions between them.
+"""Breakpoints of an expression (jumps and kinks) by interval bisection, and the smooth expressions between them.
 
 step, ramp, abs, min and max switch where an argument (or a difference of two) passes a number. These roots are
-isolated by interval arithmetic (`enclosure`): an interval holds none where the bounds of the argument exclude 0; where
-those of its derivative do, the signs at its ends decide; other intervals are bisected. A root is then the first
-double-precision number at which the argument, as computed, is no longer on its old side. Poles of quotients,
-logarithms, powers and tangents are sought in the same way and refused.
+isolated by interval arithmetic (Moore, Kearfott and Cloud, Introduction to Interval Analysis, 2009, chapter 8;
+`enclosure`): an interval holds none where the bounds of the argument exclude 0; where those of its derivative do, the
+signs at its ends decide; other intervals are bisected. A root is the first double-precision number at which the
+computed argument has changed its sign. Poles of quotients, logarithms, powers and tangents are located in the same way
+and refused.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from shoal.scene.formula import Node, make, value, written
 Array = npt.NDArray[Any]
 
 _MOST_INTERVALS = 2**17
-"""Intervals looked at for one argument: a bound on time."""
+"""Intervals examined for one argument, at most: a bound on time."""
 _MOST_SWITCHES = 20_000
 _ULP = 2.0**-52
 _NOWHERE = 2.0**-100
@@ -120,7 +121,7 @@ class _Cutter:
         return out
 
     def _roots(self, operation: str, edges: Array, nodes: list[Node]) -> Array:
-        """The edges, and every place between them where the tree of its piece changes sign or, for poles, is 0."""
+        """Return the edges, and all roots between them where the tree of a piece changes sign or, for poles, is 0."""
         found = [edges]
         for node, numbers in Branches(edges, nodes).groups().items():
             if isinstance(node, tuple) or node == "t":
@@ -176,7 +177,7 @@ class _Cutter:
         return found
 
     def _refined(self, node: Node, lower: Array, upper: Array) -> Array:
-        """In every interval on which a tree is monotone, the first number past its root, if it has one."""
+        """Return the first number past the root in each interval on which a tree is monotone, by bisection."""
         before, after = np.sign(_values(node, lower, 1)), np.sign(_values(node, upper, -1))
         ends = np.concatenate([lower[before == 0], upper[(after == 0) & (before == 0)]])
         inside = (before != 0) & (before != after)

@@ -21,31 +21,34 @@ CURVES = ("ancf-cable", "ancf-quintic")
 
 
 class BodyState(Record):
-    """State of a body.
-
-    vectors: of a rigid body its origin [m] and its directors (of a point mass the origin alone), of a flexible rod
-    those of its nodes (place [m], slope, ...), one node after the other, of a modal body its origin, its director and a
-    vector of every mode [m]; rates: their derivatives by time. element, mesh, length [m]: of the body in that run.
-    """
+    """State of a body at the end of a run."""
 
     element: str
+    """Element of the body in that run."""
     mesh: dict[str, int] = {}
+    """Numbers of its elements or modes in that run."""
     length: float | None = None
+    """Length of the rod in that run [m]."""
     vectors: tuple[tuple[float, ...], ...]
+    """Of a rigid body its origin [m] and its directors [1] (of a point mass the origin alone), of a flexible rod those
+    of its nodes (place, slope, ...), one node after the other, of a modal body its origin, its director and a vector of
+    every mode [m].
+    """
     rates: tuple[tuple[float, ...], ...]
+    """Time derivatives of the vectors [m/s, 1/s]."""
 
 
 class End(Record):
-    """The state of a machine at the end of a run, of which `t` was the time [s].
-
-    turns: the angles [rad] that joints and loads have counted, in their order; angles: the directions [rad] of markers,
-    counted over full turns.
-    """
+    """The state of a machine at the end of a run."""
 
     t: float
+    """Time [s]."""
     bodies: dict[str, BodyState]
+    """State of every body by name."""
     turns: dict[str, tuple[float, ...]] = {}
+    """Angles that joints and loads have counted, in their order [rad]."""
     angles: dict[str, float] = {}
+    """Directions of markers, counted over full turns [rad]."""
 
     def check(self, bodies: Mapping[str, Any]) -> None:
         """Raises ValueError, one line, where it is that of other bodies."""

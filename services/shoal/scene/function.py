@@ -27,18 +27,23 @@ MOST_ROWS = 20_000
 class Function(Record):
     """A function of time t [s]: written `0.5`, `"0.1*sin(3*t)"`, `{expression: ...}` or `{table: [[t, value], ...]}`.
 
-    A table needs times that increase; `smooth` (the default) draws a cubic spline through it (not-a-knot, two
-    continuous derivatives), otherwise straight lines. Outside its times a table keeps its end values.
-    noise: standard deviation of what each value of a table was measured with, if it is known; smoothing: strength of
-    the smoothing that followed (`smoothing.smooth`, 0: none). Identification carries that noise to the intervals.
+    Identification carries the noise of a table to the intervals.
     """
 
     number: float | None = None
+    """A constant [the unit of the field]."""
     expression: str | None = None
+    """Expression in `t` with + - * / **, sin cos tan tanh sqrt exp log abs step ramp min max, pi and e."""
     table: tuple[tuple[float, float], ...] | None = None
+    """Rows of time and value [s, the unit of the field] with increasing times. Outside its times a table keeps its end
+    values.
+    """
     smooth: bool = True
+    """Whether a table is interpolated by a cubic spline (not-a-knot), else by straight lines."""
     noise: NonNegative | None = None
+    """Standard deviation of the measured values of a table, if it is known [the unit of the field]."""
     smoothing: NonNegative = 0.0
+    """Strength of the smoothing after the measurement, 0 for none (`smoothing.smooth`) [1]."""
 
     @model_validator(mode="before")
     @classmethod

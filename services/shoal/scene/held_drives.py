@@ -9,7 +9,7 @@ import numpy as np
 from shoal.scene.function import Function
 from shoal.scene.scene import Scene
 
-_ROUND_OFF = 1e-9
+_NO_JUMP = 1e-9
 """Of the largest rate between two rows of a table: less is no jump."""
 
 
@@ -33,7 +33,7 @@ def _jumps(path: str, drive: Function, unit: str, end: float) -> Iterator[str]:
     if drive.table is None or len(drive.table) < 2:
         return
     times, values = np.array(drive.table).T
-    least = _ROUND_OFF * float(np.max(np.abs(np.diff(values) / np.diff(times))))
+    least = _NO_JUMP * float(np.max(np.abs(np.diff(values) / np.diff(times))))
     first, last = drive.table_slope(times[0], left=False), drive.table_slope(times[-1], left=True)
     if 0.0 < times[0] < end and abs(first) > least:
         holds = f"its table begins at {times[0]:.6g} s: until then it holds {values[0]:.6g} {unit}"

@@ -28,24 +28,29 @@ ABOUT_Z: dict[Quantity, Quantity] = {"angle": "rotation", "rate": "spin"}
 
 
 class InitialState(Record):
-    """Absolute angle [rad], counter-clockwise from +X, and rate [rad/s] of a body at time zero.
+    """Initial state of a body.
 
-    position [m] and velocity [m/s] are those of its frame's origin. None: not stated; it follows from the joints
-    and the stated quantities, else it is zero. rotation, spin: in space, a rotation vector [rad] in place of the angle
-    and an angular velocity [rad/s] along the axes of the ground in place of the rate. modes, mode_rates: of a body that
-    bends by modes, their amplitudes and rates, all or none. guess: the quantities that may change
-    where the joints demand it.
+    What is not stated follows from the joints and the stated quantities, else it is zero.
     """
 
     angle: Angle | None = None
+    """Angle from +X, counter-clockwise [rad]."""
     rate: float | None = None
+    """Angular velocity [rad/s]."""
     position: Vector | None = None
+    """Origin of the body's frame [m]."""
     velocity: Vector | None = None
+    """Velocity of the origin of the body's frame [m/s]."""
     rotation: Vector3 | None = None
+    """In space, rotation vector in place of `angle` [rad]."""
     spin: Vector3 | None = None
+    """In space, angular velocity along the axes of the ground in place of `rate` [rad/s]."""
     modes: tuple[float, ...] = ()
+    """Amplitudes of a body that bends by modes, all or none [m]."""
     mode_rates: tuple[float, ...] = ()
+    """Rates of these amplitudes, all or none [m/s]."""
     guess: tuple[Quantity, ...] = ()
+    """The quantities that may change where the joints demand it."""
 
     def stated(self, quantity: Quantity) -> bool:
         """Return whether the user gave this quantity a value."""

@@ -26,15 +26,20 @@ class Attachment(Record):
     """
 
     body: str
+    """Name of the body, or `ground`."""
     point: str | Vector = "start"
+    """Named point, or coordinates in the body's frame [m]; on a flexible rod the arc length and 0."""
 
 
 class MovingPoint(Record):
-    """A point of the ground that moves: coordinates [m] as functions of time."""
+    """A point of the ground that moves."""
 
     x: Function = Function(number=0.0)
+    """Coordinate x [m] as a function of time."""
     y: Function = Function(number=0.0)
+    """Coordinate y [m] as a function of time."""
     z: Function = Function(number=0.0)
+    """Coordinate z [m] as a function of time, in space."""
 
 
 class Tie(Record):
@@ -43,22 +48,24 @@ class Tie(Record):
     kind: str
     turned: ClassVar[tuple[str, ...]]
     first: Attachment
+    """Place on the first body."""
     second: Attachment
+    """Place on the second body."""
 
 
 class Resisted(Tie):
-    """A joint that moves in one way, which resists its rate: an angle's [rad/s] and by a torque, or a way's [m/s].
-
-    friction: viscous [N m s/rad or N s/m]; drag: quadratic, as of air [N m s^2/rad^2 or N s^2/m^2]; coulomb: dry
-    [N m or N], smoothed as tanh(rate / coulomb_speed); mu: coefficient of dry friction by the joint's force, smoothed
-    alike.
-    """
+    """A joint with one free motion that resists its rate: a rotation [rad/s] or a displacement [m/s]."""
 
     friction: NonNegative = 0.0
+    """Viscous friction [N m s/rad; of a slider N s/m]."""
     drag: NonNegative = 0.0
+    """Quadratic drag, as of air [N m s^2/rad^2; of a slider N s^2/m^2]."""
     coulomb: NonNegative = 0.0
+    """Dry friction [N m; of a slider N], smoothed as tanh(rate / coulomb_speed)."""
     coulomb_speed: Positive = 1e-2
+    """Rate that smooths dry friction [rad/s; of a slider m/s]."""
     mu: NonNegative = 0.0
+    """Coefficient of dry friction by the joint's force [1], smoothed alike."""
 
     @property
     def share(self) -> float:
@@ -83,19 +90,17 @@ class Resisted(Tie):
 
 
 class Revolute(Resisted):
-    """Two places stay together; the bodies turn freely but for friction.
-
-    axis: in space, that they turn about, as it points at the start. radius: of the pin [m], at which friction by mu
-    acts: its torque is mu * radius times the force of the joint (in space with what pushes along the axis).
-    """
+    """Two places stay together; the bodies turn freely but for friction."""
 
     kind: Literal["revolute"] = "revolute"
     turned: ClassVar[tuple[str, ...]] = ()
     radius: Positive | None = None
+    """Radius of the pin at which friction by `mu` acts [m]: its torque is mu * radius times the force of the joint."""
     axis: Axis = Z
+    """Axis of rotation in space, as it points at the start [1]."""
 
     @model_validator(mode="after")
-    def _pin_is_told(self) -> Revolute:
+    def _pin_is_defined(self) -> Revolute:
         if self.mu and self.radius is None:
             raise ValueError("radius is missing; friction by mu acts at the radius of the pin (m)")
         return self
@@ -116,13 +121,15 @@ class Spherical(Tie):
 class Universal(Tie):
     """Two places stay together, and an axis of the first body stays at a right angle to one of the second.
 
-    axis, second_axis: of the first and of the second body, as they point at the start. In space only.
+    In space only.
     """
 
     kind: Literal["universal"] = "universal"
     turned: ClassVar[tuple[str, ...]] = ("first", "second")
     axis: Axis
+    """Axis of the first body, as it points at the start [1]."""
     second_axis: Axis
+    """Axis of the second body, as it points at the start [1]."""
 
     @property
     def oblique(self) -> bool:
@@ -139,58 +146,57 @@ class Universal(Tie):
 
 
 class Cylindrical(Tie):
-    """The second place moves on a line through the first along an axis, about which the bodies turn. In space only.
-
-    axis: as it points at the start.
-    """
+    """The second place moves on a line through the first, about which the bodies turn. In space only."""
 
     kind: Literal["cylindrical"] = "cylindrical"
     turned: ClassVar[tuple[str, ...]] = ("first", "second")
     axis: Axis
+    """Direction of the line, as it points at the start [1]."""
 
 
 class Planar(Tie):
-    """The second place moves in a plane through the first, fixed to the first body. In space only.
-
-    axis: normal of the plane, as it points at the start. rotation: whether the second body may turn about that axis,
-    not at all, or freely (a point in a plane).
-    """
+    """The second place moves in a plane through the first, fixed to the first body. In space only."""
 
     kind: Literal["planar"] = "planar"
     turned: ClassVar[tuple[str, ...]] = ("first",)
     axis: Axis
+    """Normal of the plane, as it points at the start [1]."""
     rotation: Literal["axis", "free", "locked"] = "axis"
+    """Rotation of the second body: about the normal (`axis`), free (a point in a plane) or locked."""
 
 
 class Weld(Tie):
-    """Two places stay together and the bodies keep their relative angle [rad] (default: that of the start)."""
+    """Two places stay together and the bodies keep their relative angle."""
 
     kind: Literal["weld"] = "weld"
     turned: ClassVar[tuple[str, ...]] = ("first", "second")
     angle: Angle | None = None
+    """Relative angle [rad]; by default that of the start."""
 
 
 class Slider(Resisted):
     """The second place moves on a line through the first one, fixed to the first body.
 
-    direction: angle [rad] of the line in the first body's frame. axis: in space, the line itself, as it points at the
-    start, instead. rotation: whether the second body may turn against the first. Friction by mu goes with the force
-    across the line.
+    Friction by mu is in proportion to the force across the line.
     """
 
     kind: Literal["slider"] = "slider"
     turned: ClassVar[tuple[str, ...]] = ("first",)
     direction: Angle = 0.0
+    """Angle of the line in the first body's frame [rad]."""
     axis: Axis | None = None
+    """Direction of the line in space, as it points at the start, in place of `direction` [1]."""
     rotation: Literal["free", "locked"] = "free"
+    """Whether the second body may turn against the first."""
 
 
 class Distance(Tie):
-    """Two places keep a distance [m] (default: that of the start), or one that is a function of time."""
+    """Two places keep a distance."""
 
     kind: Literal["distance"] = "distance"
     turned: ClassVar[tuple[str, ...]] = ()
     length: Function | None = None
+    """Distance [m] as a function of time; by default that of the start."""
 
 
 class Parallel(Tie):
@@ -208,15 +214,14 @@ class Perpendicular(Tie):
 
 
 class DrivenAngle(Tie):
-    """The angle [rad] from the first body's direction to the second's is a function of time.
-
-    axis: in space, that the angle is about, as it points at the start; it is the second body's as well.
-    """
+    """The angle from the first body's direction to the second's is a function of time."""
 
     kind: Literal["driven-angle"] = "driven-angle"
     turned: ClassVar[tuple[str, ...]] = ("first", "second")
     angle: Function
+    """Angle [rad] as a function of time."""
     axis: Axis = Z
+    """Axis of the angle in space, as it points at the start, common to both bodies [1]."""
 
 
 MOST_TEETH = 1000
@@ -240,18 +245,21 @@ def _fraction(value: Any) -> Any:
 class Gear(Tie):
     """Gears, a belt or a chain: the second body turns `ratio` times as fast as the first, as seen from a carrier.
 
-    ratio: negative for gears that mesh outside, positive for belts, chains and ring gears; a fraction of whole numbers
-    up to 1000, which may be written as text. carrier: the body that carries both bearings, by default the ground.
-    axis: in space, that the first body turns about, as it points at the start; second_axis: of the second, by default
-    the same. Both keep their direction; where they differ, as those of bevel and worm gears, the ground carries them.
+    Both axes keep their direction; where they differ, as those of bevel and worm gears, the ground carries them.
     """
 
     kind: Literal["gear"] = "gear"
     turned: ClassVar[tuple[str, ...]] = ("first", "second", "carrier")
     ratio: Annotated[float, BeforeValidator(_fraction)]
+    """Speed of the second body over that of the first [1]: negative for gears that mesh outside, positive for belts,
+    chains and ring gears; a fraction of whole numbers up to 1000, which may be text such as '-20/31'.
+    """
     carrier: Attachment = Attachment(body=GROUND, point=(0.0, 0.0))
+    """Place on the body that carries both bearings."""
     axis: Axis = Z
+    """Axis of the first body in space, as it points at the start [1]."""
     second_axis: Axis | None = None
+    """Axis of the second body in space [1]; by default that of the first."""
 
     @property
     def axes(self) -> tuple[Vector3, Vector3]:
@@ -286,17 +294,22 @@ class CoupledCoordinate(Record):
     """A coordinate of a place, with its factor in a coupling."""
 
     at: Attachment
+    """The place."""
     axis: Literal["x", "y", "z"]
+    """The coordinate."""
     factor: float = 1.0
+    """Its factor [1]."""
 
 
 class Coupling(Record):
-    """The sum of factor * coordinate equals a function of time [m]."""
+    """The sum of factor * coordinate is a function of time."""
 
     kind: Literal["coupling"] = "coupling"
     turned: ClassVar[tuple[str, ...]] = ()
     terms: Annotated[tuple[CoupledCoordinate, ...], Field(min_length=1)]
+    """Coordinates with their factors."""
     value: Function = Function(number=0.0)
+    """The sum [m] as a function of time."""
 
 
 def _revolute_if_unsaid(data: Any) -> Any:

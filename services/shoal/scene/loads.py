@@ -16,73 +16,85 @@ class Elastic(Record):
 
     kind: str
     first: Attachment
+    """Place on the first body."""
     second: Attachment
+    """Place on the second body."""
     stiffness: float = 0.0
+    """Linear stiffness [N/m; of a torsion spring N m/rad]."""
     cubic: float = 0.0
+    """Cubic stiffness [N/m^3; of a torsion spring N m/rad^3]."""
     damping: NonNegative = 0.0
+    """Viscous damping [N s/m; of a torsion spring N m s/rad]."""
 
 
 class Spring(Elastic):
-    """A spring and damper between two places, along the line that joins them.
-
-    stiffness [N/m], cubic [N/m^3], damping [N s/m]; length: where it pulls with no force [m] (default: the
-    distance at the start); elastic: further elastic force [N], a function of the elongation [m] called `t`.
-    """
+    """A spring and damper between two places, along the line that joins them."""
 
     kind: Literal["spring"] = "spring"
     length: NonNegative | None = None
+    """Length without force [m]; by default the distance at the start."""
     elastic: Function | None = None
+    """Further elastic force [N] as a function of the elongation [m], which it calls `t`."""
 
 
 class TorsionSpring(Elastic):
-    """A spring and damper between the directions of two bodies.
-
-    stiffness [N m/rad], cubic [N m/rad^3], damping [N m s/rad]; angle: relative angle of rest [rad] (default: that of
-    the start), counted over full turns; elastic: further elastic torque [N m], a function of the angle from rest [rad]
-    called `t`. axis: in space, that the angle is about, as it points at the start; a joint keeps it common to both.
-    first_to, second_to: in the plane, the direction of that side is the way to this place, in the place of the body's;
-    so a point mass has one.
-    """
+    """A spring and damper between the directions of two bodies."""
 
     kind: Literal["torsion-spring"] = "torsion-spring"
     first_to: Attachment | None = None
+    """In the plane, the first direction is that from `first` to this place, in place of the body's; so a point mass has
+    one.
+    """
     second_to: Attachment | None = None
+    """The same of the second direction."""
     axis: Axis = Z
+    """Axis of the angle in space, as it points at the start [1]; a joint keeps it common to both."""
     angle: float | None = None
+    """Relative angle at rest, counted over full turns [rad]; by default that of the start."""
     elastic: Function | None = None
+    """Further elastic torque [N m] as a function of the angle from rest [rad], which it calls `t`."""
 
 
 class Force(Record):
-    """A force [N] at a place: fixed in direction, or turning with the body; times a function of time."""
+    """A force at a place, times a function of time."""
 
     kind: Literal["force"] = "force"
     at: Attachment
+    """The place."""
     force: Vector
+    """Force along the axes of the ground at the start [N]."""
     follows: bool = False
+    """Whether its direction turns with the body."""
     scale: Function = Function(number=1.0)
+    """Factor as a function of time [1]."""
 
 
 class Torque(Record):
-    """A torque [N m] on a body, counter-clockwise, as a function of time; `reaction`: the body that takes it.
-
-    axis: in space, that of the torque as it points at the start; it turns with the body that takes the torque, and is
-    fixed where the ground does.
-    """
+    """A torque on a body, counter-clockwise."""
 
     kind: Literal["torque"] = "torque"
     at: Attachment
+    """Place on the body."""
     torque: Function
+    """Torque [N m] as a function of time."""
     axis: Axis = Z
+    """Axis of the torque in space, as it points at the start [1]. It turns with the body of `reaction`, and is fixed
+    for the ground.
+    """
     reaction: Attachment | None = None
+    """Place on the body that takes the reaction; by default the ground."""
 
 
 class DistributedForce(Record):
-    """A force per length [N/m] along a whole rod, fixed in direction; times a function of time."""
+    """A force per length along a whole rod, fixed in direction, times a function of time."""
 
     kind: Literal["distributed-force"] = "distributed-force"
     body: str
+    """Name of the rod."""
     force: Vector
+    """Force per length along the axes of the ground [N/m]."""
     scale: Function = Function(number=1.0)
+    """Factor as a function of time [1]."""
 
 
 Load = Annotated[Spring | TorsionSpring | Force | Torque | DistributedForce, Field(discriminator="kind")]

@@ -49,28 +49,38 @@ Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")]
 class Scene(Record):
     """A machine in SI units: bodies, joints, loads, markers, initial state, gravity, solver settings.
 
-    dimensions: 2, or 3 for one in space. initial_from: `statics` for a machine that starts at rest where its forces
-    balance; a file says it as `from` in `initial`, whose angles and positions then say near where. Or the end of a run,
-    at which it goes on; what `initial` says beside is then what joints keep that hold what the start gives them.
-
-    expect: what the nights of its library ask of it; no part of the machine, so that what is written of a scene,
-    compared by its fingerprint or made of it by `with_values` is without.
+    What is written of a scene, compared by its fingerprint or made of it by `with_values` is without `expect`.
     Raises pydantic's ValidationError; `Scene.parse` and `with_values` raise `InputError` in one line.
     """
 
     name: str
+    """Name of the scene in tables and files."""
     description: str = ""
+    """One line that describes the machine."""
     dimensions: Dimensions = 2
+    """2 in the plane, 3 in space."""
     gravity: Vector = (0.0, -9.81)
+    """Gravitational acceleration along the axes of the ground [m/s^2]."""
     bodies: Annotated[dict[Name, Body], Field(min_length=1)]
+    """Bodies by name."""
     joints: dict[Name, Joint] = {}
+    """Joints by name."""
     loads: dict[Name, Load] = {}
+    """Loads by name."""
     ground_points: dict[Name, MovingPoint] = {}
+    """Moving points of the ground by name."""
     markers: Annotated[dict[Name, Attachment], Field(min_length=1)]
+    """Places whose motion is reported, by name."""
     initial: dict[str, InitialState] = {}
+    """Initial state of bodies, by the name of the body. Its key `from` is `initial_from`."""
     initial_from: Literal["statics"] | End | None = None
+    """`statics`: start at rest where all forces balance, near the stated angles and positions. Or the end of a run that
+    is continued; what `initial` states then defines what joints without a stated length or angle keep.
+    """
     solver: Solver = Solver()
+    """Settings of the integrator and of the checks of a run."""
     expect: Annotated[dict[Name, Expectation], Field(exclude=True)] = {}
+    """Nightly checks of a scene of the library, by name; no part of the machine."""
 
     @model_validator(mode="before")
     @classmethod

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -32,17 +33,24 @@ def stouter(scene: Scene, *, exact: bool = True) -> Scene | None:
     rotary inertia of their section. exact: whether `with_shear` is asked at all, whose rods need an implicit method
     """
     stout = with_shear(scene) if exact else None
-    values: dict[str, Any] = {}
-    for name, rod in scene.bodies.items():
-        if not isinstance(rod, Rod) or rod.shears:
-            continue
-        if rod.element == "rigid" and not rod.rotary_inertia:
-            values[f"bodies.{name}.rotary_inertia"] = True
-        elif rod.element != "rigid" and stout is None and rod.youngs_modulus is not None:
-            values[f"bodies.{name}.youngs_modulus"] = rod.youngs_modulus / (1.0 + slender_share(rod))
+    rods = {name: rod for name, rod in scene.bodies.items() if isinstance(rod, Rod) and not rod.shears}
+    values = like_stout({name: rod for name, rod in rods.items() if stout is None or rod.element == "rigid"})
     if not values:
         return stout
     return (stout or scene).with_values(values)
+
+
+def like_stout(rods: Mapping[str, Rod]) -> dict[str, Any]:
+    """Values of a scene, by path, with which slender rods move like stout ones: rigid ones exactly, with the rotary
+    inertia of their sections, flexible ones by order of magnitude, softer by the share that shear and inertia have.
+    """
+    values: dict[str, Any] = {}
+    for name, rod in rods.items():
+        if rod.element == "rigid" and not rod.rotary_inertia:
+            values[f"bodies.{name}.rotary_inertia"] = True
+        elif rod.element != "rigid" and rod.youngs_modulus is not None:
+            values[f"bodies.{name}.youngs_modulus"] = rod.youngs_modulus / (1.0 + slender_share(rod))
+    return values
 
 
 def slender_share(rod: Rod) -> float:

@@ -1,4 +1,4 @@
-"""Bodies that are no rods: rigid ones of any shape, flexible ones by given modes, and point masses."""
+"""Bodies other than rods: rigid bodies, modal bodies (floating frame of reference formulation), point masses."""
 
 from __future__ import annotations
 
@@ -23,24 +23,25 @@ def _formed(given: Any) -> Any:
 Principal = tuple[NonNegative, NonNegative, NonNegative]
 Matrix = tuple[Vector3, Vector3, Vector3]
 if TYPE_CHECKING:
-    Inertia = Any  # who computes in the plane has one number, or one a lane
+    Inertia = Any  # in the plane one number, or one a lane
 else:
     Inertia = Annotated[NonNegative | Principal | Matrix, BeforeValidator(_formed)]
 
 
 class RigidBody(Record):
-    """A rigid body of any shape: mass [kg], inertia about the centre of mass [kg m^2], named points [m].
-
-    In space the inertia is a number (the same about every axis), three principal moments about the axes of the body's
-    frame, or a symmetric matrix in it.
-    The point `start` is the origin of the body's frame unless `named_points` says otherwise.
-    """
+    """A rigid body of any shape."""
 
     kind: Literal["rigid-body"] = "rigid-body"
     mass: Positive
+    """Mass [kg]."""
     inertia: Inertia
+    """Moment of inertia about the centre of mass [kg m^2]. In space a number (the same about every axis), three
+    principal moments about the axes of the body's frame, or a symmetric matrix in it.
+    """
     centre_of_mass: Vector = (0.0, 0.0)
+    """Centre of mass in the body's frame [m]."""
     named_points: dict[str, Vector] = {}
+    """Points in the body's frame by name [m]. `start` is the origin unless it is named here."""
     element: Literal["rigid"] = "rigid"
     limiting: ClassVar[tuple[str, ...]] = ("inertia",)
 
@@ -79,36 +80,42 @@ Rows = Annotated[tuple[float, ...] | tuple[tuple[float, ...], ...], Field(min_le
 
 
 class Mode(Record):
-    """A shape (u, v) by which the material points of a body move in its frame, per unit of its amplitude.
-
-    Integrals over the mass: translation, of (u, v) [kg]; moment, of x v - y u [kg m]; stretch, of x u + y v [kg m].
-    points: (u, v) or (u, v, turn [rad/m]) at named points; at others it is zero.
-    """
+    """A shape (u, v) by which the material points of a body move in its frame, per unit of its amplitude."""
 
     translation: tuple[float, float] = (0.0, 0.0)
+    """Integral of (u, v) over the mass [kg]."""
     moment: float = 0.0
+    """Integral of x v - y u over the mass [kg m]."""
     stretch: float = 0.0
+    """Integral of x u + y v over the mass [kg m]."""
     points: dict[str, Annotated[tuple[float, ...], Field(min_length=2, max_length=3)]] = {}
+    """(u, v) or (u, v, turn) at named points [1, 1, rad/m]; zero at others."""
 
 
 class ModalBody(Record):
-    """A body of the plane that bends by given modes: a floating frame and small displacements in it.
-
-    mass [kg], inertia about the centre of mass [kg m^2], centre_of_mass and named_points [m] are those of the body
-    without deformation. modal_mass: integrals of u_i u_j + v_i v_j [kg]; modal_stiffness [N/m]; modal_damping [N s/m];
-    modal_coupling: integrals of u_i v_j - v_i u_j [kg], by which modes feel each other in a frame that turns.
-    """
+    """A body of the plane that bends by given modes: a floating frame and small displacements in it."""
 
     kind: Literal["modal-body"] = "modal-body"
     mass: Positive
+    """Mass [kg]."""
     inertia: Positive
+    """Moment of inertia about the centre of mass of the undeformed body [kg m^2]."""
     centre_of_mass: tuple[float, float] = (0.0, 0.0)
+    """Centre of mass of the undeformed body in its frame [m]."""
     named_points: dict[str, tuple[float, float]] = {}
+    """Points of the undeformed body in its frame by name [m]."""
     modes: Annotated[tuple[Mode, ...], Field(min_length=1)]
+    """The shapes."""
     modal_mass: Rows
+    """Integrals of u_i u_j + v_i v_j over the mass [kg], by rows or by the diagonal."""
     modal_stiffness: Rows
+    """Modal stiffness [N/m], by rows or by the diagonal."""
     modal_damping: Rows | None = None
+    """Modal damping [N s/m], by rows or by the diagonal; default zero."""
     modal_coupling: Rows | None = None
+    """Integrals of u_i v_j - v_i u_j over the mass [kg], the gyroscopic coupling of modes in a rotating frame; default
+    zero.
+    """
     element: Literal["modal"] = "modal"
 
     @model_validator(mode="after")
@@ -196,10 +203,11 @@ def _check_inertia(moments: Any) -> None:
 
 
 class PointMass(Record):
-    """A mass [kg] without extension."""
+    """A mass without extension."""
 
     kind: Literal["point-mass"] = "point-mass"
     mass: Positive
+    """Mass [kg]."""
     element: Literal["rigid"] = "rigid"
 
     @property

@@ -12,7 +12,7 @@ from shoal.mechanics.numerics.alike import FEW
 from shoal.mechanics.simulate import STEP_MARGIN
 from shoal.scene import FRAMED
 from shoal.selection.levels import LADDERS, Level, Levels, below
-from shoal.selection.refine import PACE, TELL, Reference, Runs
+from shoal.selection.refine import PACE, TELL, LevelRuns, ReferenceModel
 from shoal.selection.run import Candidate, distance
 
 WITHIN = 0.9
@@ -37,7 +37,7 @@ VECTORS = {"rigid": 0, "ancf-cable": 2, "ancf-quintic": 3}
 """Nodal vectors that an element adds, of those whose inertia can be capped."""
 
 
-def coarsen(runs: Runs, reference: Reference, rods: tuple[str, ...], tolerance: float) -> Candidate | None:
+def coarsen(runs: LevelRuns, reference: ReferenceModel, rods: tuple[str, ...], tolerance: float) -> Candidate | None:
     """Return the cheapest candidate within the tolerance; None if none is.
 
     A rod in a floating frame costs more than a few elements, unless it lets the machine take longer steps: so the rods
@@ -66,7 +66,7 @@ def coarsen(runs: Runs, reference: Reference, rods: tuple[str, ...], tolerance: 
     return min(found, key=lambda candidate: candidate.work, default=None)
 
 
-def _start(runs: Runs, reference: Reference, framed: Sequence[str], tolerance: float) -> Candidate | None:
+def _start(runs: LevelRuns, reference: ReferenceModel, framed: Sequence[str], tolerance: float) -> Candidate | None:
     """Return the base with some rods in floating frames, rigid if that is accurate enough; None if no modes suffice."""
     if any(runs.coarsest[rod].element not in FRAMED for rod in framed):
         return None
@@ -79,7 +79,7 @@ def _start(runs: Runs, reference: Reference, framed: Sequence[str], tolerance: f
     return most if most.error <= HOPEFUL * tolerance else None
 
 
-def _modes(runs: Runs, reference: Reference, framed: Sequence[str]) -> dict[str, Level]:
+def _modes(runs: LevelRuns, reference: ReferenceModel, framed: Sequence[str]) -> dict[str, Level]:
     """Return numbers of modes that allow one step, the largest with which the model costs less than the base."""
     steps = {
         rod: {
@@ -97,7 +97,7 @@ def _modes(runs: Runs, reference: Reference, framed: Sequence[str]) -> dict[str,
     return frames
 
 
-def _fewest(runs: Runs, rod: str) -> Level:
+def _fewest(runs: LevelRuns, rod: str) -> Level:
     """Return the cheapest level of a rod that has elements."""
     fewest = dict[str, Level]()
     for level in LADDERS[runs.limits[rod]]:
@@ -107,7 +107,7 @@ def _fewest(runs: Runs, rod: str) -> Level:
 
 
 def _down(
-    runs: Runs, reference: Reference, base: Candidate, rods: tuple[str, ...], tolerance: float, enough: float
+    runs: LevelRuns, reference: ReferenceModel, base: Candidate, rods: tuple[str, ...], tolerance: float, enough: float
 ) -> Candidate | None:
     """Return the cheapest candidate coarser than a base and within the tolerance; None if none is.
 
@@ -136,7 +136,7 @@ def _down(
 
 
 def _strided(
-    runs: Runs, reference: Reference, combinations: list[Levels], tolerance: float, found: Candidate
+    runs: LevelRuns, reference: ReferenceModel, combinations: list[Levels], tolerance: float, found: Candidate
 ) -> Candidate:
     """Return a cheaper candidate within the tolerance by longer steps with capped inertia, else the one given.
 
@@ -160,7 +160,7 @@ def _few(levels: Levels) -> bool:
     return cappable and sum(VECTORS[level.element] * level.elements for level in levels.values()) <= FEW
 
 
-def judged(runs: Runs, reference: Reference, levels: Levels, fraction: float = STEP_MARGIN) -> Candidate:
+def judged(runs: LevelRuns, reference: ReferenceModel, levels: Levels, fraction: float = STEP_MARGIN) -> Candidate:
     """Run these levels and estimate their error by the reference."""
     candidate = runs(levels, fraction, role="candidate")
     candidate.error = distance(candidate.trajectory, reference.candidate.trajectory) + reference.error
@@ -168,7 +168,7 @@ def judged(runs: Runs, reference: Reference, levels: Levels, fraction: float = S
 
 
 def _alone(
-    runs: Runs, reference: Reference, context: Candidate, rod: str, tolerance: float, enough: float
+    runs: LevelRuns, reference: ReferenceModel, context: Candidate, rod: str, tolerance: float, enough: float
 ) -> dict[Level, float]:
     """Return the distances from the context [m] of models in which one rod is coarser, until `enough` work is done."""
     start = context.levels[rod]
@@ -200,7 +200,9 @@ def _alone(
     return table
 
 
-def _combinations(runs: Runs, base: Candidate, tables: dict[str, dict[Level, float]], tolerance: float) -> list[Levels]:
+def _combinations(
+    runs: LevelRuns, base: Candidate, tables: dict[str, dict[Level, float]], tolerance: float
+) -> list[Levels]:
     """Return the combinations that may meet the tolerance, by forecast work."""
     found = []
     for chosen in product(*tables.values()):

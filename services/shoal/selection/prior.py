@@ -40,7 +40,7 @@ NUDGE = 1e-4
 
 
 @dataclass(frozen=True)
-class Prior:
+class PriorEstimate:
     """A priori estimates for a rod.
 
     deflection: quasi-static, largest along the motion [m], nan if the loads are not known beforehand
@@ -55,7 +55,7 @@ class Prior:
     frequency: float
 
 
-def estimate(scene: Scene, rods: tuple[str, ...]) -> dict[str, Prior]:
+def estimate(scene: Scene, rods: tuple[str, ...]) -> dict[str, PriorEstimate]:
     """The estimate for every rod whose model is open; nan where the rigid motion cannot be had.
 
     So it is in space with a curved or twisted rod: no rigid one has its shape.
@@ -74,7 +74,7 @@ def estimate(scene: Scene, rods: tuple[str, ...]) -> dict[str, Prior]:
         assert rod.youngs_modulus is not None
         speed = np.sqrt(rod.youngs_modulus / rod.density) * min(rod.section_at(0).gyration(scene.dimensions))
         error = OVERSHOOT * deflection * (1.0 + growth)
-        found[name] = Prior(deflection, growth, error, float(np.pi**2 * speed / rod.length**2))
+        found[name] = PriorEstimate(deflection, growth, error, float(np.pi**2 * speed / rod.length**2))
     return found
 
 

@@ -49,7 +49,7 @@ Progress = Callable[[str], None]
 
 
 @dataclass
-class Reference:
+class ReferenceModel:
     """The finest model that was run and the coarser one that agrees with it.
 
     candidate, error: the finest and its own estimated error [m]; base: levels of the coarser
@@ -60,7 +60,7 @@ class Reference:
     base: dict[str, Level]
 
 
-class Runs:
+class LevelRuns:
     """Runs of one scene on different levels, each made once.
 
     limits: the open rods with the element whose limit is their truth; fewest: see `run.fewest`; coarsest: the first
@@ -139,8 +139,8 @@ class Runs:
 
 
 def refine(
-    runs: Runs, rods: tuple[str, ...], fixed: Levels, tolerance: float, impatient: bool = False
-) -> Reference | str:
+    runs: LevelRuns, rods: tuple[str, ...], fixed: Levels, tolerance: float, impatient: bool = False
+) -> ReferenceModel | str:
     """Refine the rods until two meshes agree; else return the reason why none do.
 
     impatient: another theory remains: end also where runs are rejected, or a doubling of the elements gains little, as
@@ -168,7 +168,7 @@ def refine(
         error = left(gaps, fine.levels)[0] + sum(behind.values())
         if max(error, gaps[-1]) <= AGREE * tolerance:
             fine.error = error
-            return Reference(fine, error, {**fixed, **runs.refined(base)})
+            return ReferenceModel(fine, error, {**fixed, **runs.refined(base)})
         if impatient and max(count.values()) >= FINE and len(gaps) > 1 and gaps[-2] < GAIN * gaps[-1] < np.inf:
             return f"twice as many elements gain a factor of {gaps[-2] / gaps[-1]:.2g} only"
         if len(growing) > 1 and fine.ok:
@@ -176,7 +176,7 @@ def refine(
     return fine
 
 
-def _refinement(runs: Runs, levels: Levels) -> Candidate | str:
+def _refinement(runs: LevelRuns, levels: Levels) -> Candidate | str:
     """Run these levels by half the stable step; else return that it would take too much work."""
     work = runs.forecast.work(levels) * STEP_MARGIN / HALF
     if (seconds := work / PACE) <= runs.patience:
@@ -189,7 +189,7 @@ def _refinement(runs: Runs, levels: Levels) -> Candidate | str:
 
 
 def _next(
-    runs: Runs,
+    runs: LevelRuns,
     fine: Candidate,
     count: dict[str, int],
     base: dict[str, int],

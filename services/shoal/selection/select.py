@@ -12,14 +12,14 @@ from shoal.arguments import check
 from shoal.compile import clock
 from shoal.engines.contract import sampling_times
 from shoal.engines.gauss import GaussEngine
-from shoal.engines.theory import left_out, softer
+from shoal.engines.theory import left_out
 from shoal.error_budget import ErrorBudget
 from shoal.errors import ComputationError, InputError
 from shoal.scene import Rod, Scene
 from shoal.selection.coarsen import WITHIN, coarsen
 from shoal.selection.levels import RIGID, SHEARS, SLENDER, STOUT, Levels, apply, open_rods
-from shoal.selection.prior import Prior, estimate
-from shoal.selection.refine import AGREE, PATIENCE, REFERENCE, Progress, Reference, Runs, refine, settled
+from shoal.selection.prior import PriorEstimate, estimate
+from shoal.selection.refine import AGREE, PATIENCE, REFERENCE, LevelRuns, Progress, ReferenceModel, refine, settled
 from shoal.selection.run import Candidate, distance, fewest, rigid_scene, run
 from shoal.selection.strain_limits import excessive_torques
 from shoal.trajectory import Array, Status, Trajectory, plain
@@ -46,7 +46,7 @@ class Selection:
     chosen: its scene reproduces the run; trajectory: at the requested times; met: whether the sum of its known errors,
     that of the theory among them, is within the tolerance [m]; candidates: every run, in order; priors: a priori
     estimates; rigid: rods that stay rigid and why; limits: the element whose limit is the truth of each rod; shear:
-    neglected by the theory of the beam, by order of magnitude [m]; wall_s: of all runs
+    neglected by the theory of the beam, by order of magnitude [m], None if unknown; wall_s: of all runs
     """
 
     tolerance: float
@@ -55,16 +55,21 @@ class Selection:
     chosen: Candidate
     trajectory: Trajectory
     candidates: list[Candidate]
-    priors: dict[str, Prior]
+    priors: dict[str, PriorEstimate]
     rigid: dict[str, str]
     limits: dict[str, str]
-    shear: float
+    shear: float | None
     wall_s: float = 0.0
 
     @property
     def errors(self) -> ErrorBudget:
         """Return the errors of the chosen model at the markers [m]: of its steps and mesh, and of its theory."""
         return _budget(self.chosen, self.shear)
+
+    @property
+    def shear_counts(self) -> bool:
+        """Return whether what the theory neglects counts beside the tolerance, as it does where it is not known."""
+        return self.shear is None or self.shear > COUNTS_FROM * self.tolerance
 
     def to_json(self) -> dict[str, Any]:
         """Return the object that `shoal simulate --tolerance --json` prints below `selection`."""
@@ -85,10 +90,14 @@ class Selection:
         return dict(plain(data))
 
 
-def _budget(chosen: Candidate, shear: float) -> ErrorBudget:
+def _worth(shear: float | None) -> str:
+    return "of unknown size" if shear is None else f"worth about {shear:.1g} m"
+
+
+def _budget(chosen: Candidate, shear: float | None) -> ErrorBudget:
     """Return `Selection.errors`, whose sum decides whether the tolerance is met."""
     model = chosen.error if np.isfinite(chosen.error) else None
-    return ErrorBudget({"model": model, **({"theory": shear} if shear else {})})
+    return ErrorBudget({"model": model, **({} if shear == 0.0 else {"theory": shear})})
 
 
 def _candidate_json(candidate: Candidate, chosen: bool) -> dict[str, Any]:
@@ -147,7 +156,7 @@ def select(
         reason = f"{beyond}; slender rods: {found.reason}"
         found = replace(found, reason=reason, trajectory=_rejected(found.trajectory, found.errors, reason))
     elif (may_shear and not found.met) or (
-        auto and found.shear > COUNTS_FROM * tolerance and (may_shear or _stout(scene, found.rigid) != scene)
+        auto and found.shear_counts and (may_shear or _stout(scene, found.rigid) != scene)
     ):
         shearing = {rod: SHEARS if may_shear and limit == SLENDER else limit for rod, limit in limits.items()}
         found = _of_both(found, _of_theory(task._replace(scene=_stout(scene, closed)), shearing, stout=True))
@@ -156,7 +165,7 @@ def select(
 
 
 class _Task(NamedTuple):
-    """The request, and what is known before a theory is chosen, see `Selection`.
+    """The request and the prior estimates, from which a theory is chosen; see `Selection`.
 
     closed, fewest: see `_open`
     """
@@ -164,7 +173,7 @@ class _Task(NamedTuple):
     scene: Scene
     tolerance: float
     asked: Array
-    priors: dict[str, Prior]
+    priors: dict[str, PriorEstimate]
     closed: dict[str, str]
     progress: Progress
     patience: float
@@ -177,14 +186,14 @@ def _of_both(slender: Selection, shearing: Selection) -> Selection:
     """Choose between theories where that of slender rods neglects too much, or its meshes do not converge."""
     candidates = [*slender.candidates, *shearing.candidates]
     if shearing.met:
-        counts = slender.shear > COUNTS_FROM * slender.tolerance
-        why = f"shear and rotary inertia, worth about {slender.shear:.1g} m, count; " if counts else ""
+        why = f"shear and rotary inertia, {_worth(slender.shear)}, count; " if slender.shear_counts else ""
         return replace(shearing, candidates=candidates, reason=why + shearing.reason)
     if not slender.met:
         nearer = shearing if _error(shearing) < _error(slender) else slender
         reason = f"slender rods: {slender.reason}; with shear and rotary inertia: {shearing.reason}"
         rejected = _rejected(nearer.trajectory, nearer.errors, reason)
         return replace(nearer, candidates=candidates, reason=reason, trajectory=rejected)
+    assert slender.shear is not None  # else it would not be met
     reason = f"slender rods leave out about {slender.shear:.1g} m, and with shear and rotary inertia {shearing.reason}"
     rough = replace(slender, shear=slender.shear / COUNTS_FROM)  # known roughly, and nothing confirms it
     trajectory = _rejected(slender.trajectory, rough.errors, reason)
@@ -210,7 +219,7 @@ def _of_theory(task: _Task, limits: Mapping[str, str], another: bool = False, st
     unmoved = [rod for rod, prior in priors.items() if prior.error * SURELY_RIGID * len(limits) < tolerance]
     surely = [rod for rod in unmoved if rod not in task.meshed]
     closed = task.closed | {rod: f"would move the markers by about {priors[rod].error:.1g} m" for rod in surely}
-    runs = Runs(task.scene, grid, limits, task.progress, task.patience, task.meshed, task.fewest)
+    runs = LevelRuns(task.scene, grid, limits, task.progress, task.patience, task.meshed, task.fewest)
     fixed = {
         rod: replace(level, rotary=level.rotary or (stout and level == RIGID)) for rod, level in runs.coarsest.items()
     }
@@ -229,7 +238,7 @@ def _of_theory(task: _Task, limits: Mapping[str, str], another: bool = False, st
     errors = _budget(chosen, shear)
     met = not errors.unknown and (errors.total or 0.0) <= tolerance
     if not met and chosen.error <= tolerance:
-        reason = f"shear and rotary inertia that the rods leave out are worth about {shear:.1g} m; {reason}"
+        reason = f"shear and rotary inertia that the rods leave out are {_worth(shear)}; {reason}"
     return Selection(
         tolerance=tolerance,
         met=met,
@@ -250,17 +259,13 @@ def _for_mesh(tolerance: float, chosen: Candidate, known: float) -> float:
     All of it where the theory alone neglects more: the answer is not met, but its mesh and steps are as accurate as
     was asked for.
     """
-    left = tolerance - _shear(chosen)
+    left = tolerance - (_shear(chosen) or 0.0)
     return left if left > known else tolerance
 
 
-def _shear(chosen: Candidate, share: Callable[..., float] = max) -> float:
-    """Return `Selection.shear`; share: see `left_out`; 0 where it is not known."""
-    scene = chosen.scene
-    shaped = scene.dimensions == 3 and any(isinstance(rod, Rod) and not rod.straight for rod in scene.bodies.values())
-    if shaped:
-        return softer(chosen.trajectory, scene, GaussEngine()) or 0.0
-    return left_out(chosen.trajectory, scene, GaussEngine(), share) or 0.0
+def _shear(chosen: Candidate, share: Callable[..., float] = max) -> float | None:
+    """Return `Selection.shear`; share: see `theory_deviations`."""
+    return left_out(chosen.trajectory, chosen.scene, GaussEngine(), share)
 
 
 def _open(scene: Scene) -> tuple[dict[str, str], dict[str, str], dict[str, int]]:
@@ -288,7 +293,7 @@ def _open(scene: Scene) -> tuple[dict[str, str], dict[str, str], dict[str, int]]
     return {rod: limit for rod, limit in limits.items() if rod not in closed}, closed, counts
 
 
-def _rigid(runs: Runs, levels: Levels, tolerance: float, known: float) -> tuple[Candidate, str]:
+def _rigid(runs: LevelRuns, levels: Levels, tolerance: float, known: float) -> tuple[Candidate, str]:
     """Return the run with the coarsest tolerance of an adaptive integrator that the next tolerance confirms."""
     last: Candidate | None = None
     for step_tolerance in TOLERANCES:
@@ -312,7 +317,7 @@ def _rigid(runs: Runs, levels: Levels, tolerance: float, known: float) -> tuple[
 
 
 def _flexible(
-    runs: Runs,
+    runs: LevelRuns,
     rods: tuple[str, ...],
     fixed: Levels,
     task: _Task,
@@ -328,7 +333,7 @@ def _flexible(
     worst: a priori error of rigid rods, where nothing better is known [m]
     """
     within, reference = task.tolerance, refine(runs, rods, fixed, task.tolerance - known, another)
-    if not another and isinstance(reference, Reference):
+    if not another and isinstance(reference, ReferenceModel):
         within = _for_mesh(task.tolerance, reference.candidate, known)
         if reference.error > AGREE * (within - known):
             reference = refine(runs, rods, fixed, within - known)
@@ -344,7 +349,7 @@ def _flexible(
         return refined[-1], why if refined[-1].error <= within else reference, refined[-1]
     reference.error += known
     beyond = f"; but {reference.candidate.excess}" if reference.candidate.excess else ""
-    if not task.coarsened or (another and _shear(reference.candidate, min) > COUNTS_FROM * task.tolerance):
+    if not task.coarsened or (another and (_shear(reference.candidate, min) or 0.0) > COUNTS_FROM * task.tolerance):
         reference.candidate.error = reference.error
         return reference.candidate, f"the finest model{beyond}", reference.candidate
     chosen = coarsen(runs, reference, rods, within)

@@ -47,7 +47,7 @@ def _tree(kinds: list[str], seed: int, **more: Any) -> SpatialChain:
         }
     loads = {f"L{k}": {"body": f"B{k}", "position": vector(), "force": vector(), "torque": vector()} for k in (0, 1)}
     points = {f"P{k}": {"body": f"B{k}", "position": vector()} for k in range(len(kinds))}
-    return SpatialChain.parse(
+    return SpatialChain.model_validate(
         {
             "name": "tree",
             "gravity": vector(),

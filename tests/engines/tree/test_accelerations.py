@@ -7,6 +7,8 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 from shoal.engines.tree.articulated import accelerate
 from shoal.engines.tree.description import JointFrame, SpatialChain
@@ -83,7 +85,7 @@ def test_the_recursion_minimises_the_function_of_gauss(random_tree: Any, mixes: 
 
 def test_long_chains_stay_accurate() -> None:
     """400 bodies: forces put back into the dense equations leave a residual of round-off."""
-    chain = SpatialChain.parse(
+    chain = SpatialChain.model_validate(
         {
             "name": "long",
             "bodies": {
@@ -203,3 +205,15 @@ def _rotation(placement: JointFrame) -> Rotation:
 
 def _text(numbers: Any) -> str:
     return " ".join(repr(float(number)) for number in numbers)
+
+
+@given(st.floats(1e-150, 1e150), st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda a: max(map(abs, a)) > 1e-3))
+def test_the_length_of_an_axis_means_nothing(length: float, direction: Any) -> None:
+    body = {"mass": 1.0, "inertia": [[1, 0.1, 0], [0.1, 1, 0], [0, 0, 1.5]], "centre_of_mass": [1.0, 0.2, 0.3]}
+
+    def chain(axis: list[float]) -> SpatialChain:
+        hinge = {"body": "B", "axis": axis}
+        return SpatialChain.model_validate({"name": "hinge", "bodies": {"B": body}, "joints": {"P": hinge}})
+
+    here, there = _recursion(chain([length * a for a in direction])), _recursion(chain(list(direction)))
+    np.testing.assert_allclose(here, there, atol=1e-9)

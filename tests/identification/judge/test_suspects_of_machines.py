@@ -10,7 +10,7 @@ from shoal.identification import Measurement, Problem
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.stretch import odd_stretch
 from shoal.identification.judge.suspects import Suspect, suspects
-from shoal.identification.judge.suspects.candidate import Candidate
+from shoal.identification.judge.suspects.candidate import FaultHypothesis
 from shoal.identification.judge.suspects.fits import Together, groups_of
 from shoal.identification.judge.suspects.of_measurement import of_measurement
 from shoal.identification.judge.suspects.shaken import shaken
@@ -157,7 +157,7 @@ def test_fits_side_by_side_are_those_of_one_after_the_other() -> None:
 def test_runs_of_different_clocks_are_those_of_each() -> None:
     """They are simulated at once, at the instants of all."""
     model = model_of({})
-    clock: Candidate = next(c for c in of_measurement(model) if c.name == "clock")
+    clock: FaultHypothesis = next(c for c in of_measurement(model) if c.name == "clock")
     free = clock.freed(model)
     points = np.array([[-0.9, np.log(value)] for value in (1.0, 1.04, 0.97, 1.9, 1.0)])
     one_by_one = np.concatenate([free.uncounted(point[None]) for point in points])

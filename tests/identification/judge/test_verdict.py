@@ -9,8 +9,9 @@ import pytest
 from shoal.engines import get_engine
 from shoal.identification import Estimate, Measurement, Problem, Verdict, identify, load_problem, measure
 from shoal.identification.conclude import NOTHING, conclude
+from shoal.identification.findings import BETTER_MINIMUM
 from shoal.identification.forward import ForwardModel
-from shoal.identification.judge.verdict import Judgement, judge
+from shoal.identification.judge.judgement import Judgement, judge
 from shoal.identification.methods import Outcome
 from shoal.identification.methods.lanes import descend_each, differentiate_many
 from shoal.identification.methods.least_squares import descend
@@ -103,7 +104,7 @@ def test_a_noise_that_was_stated_too_small_is_told_and_no_wrong_model() -> None:
     draws = np.random.default_rng(5).standard_normal((150, 2))
     estimate = judged(1e-3, 1.3e-3 * draws)
     assert estimate.verdict is Verdict.IDENTIFIED
-    assert "times what was stated" in estimate.message
+    assert "noise-understated" in estimate.codes
     assert judged(1e-3, 4e-3 * draws).verdict is Verdict.REJECTED
 
 
@@ -148,7 +149,7 @@ def test_a_better_minimum_that_was_met_is_descended_to(monkeypatch: pytest.Monke
 
     def judged(*of: Any) -> Judgement:
         asked.append(1)
-        return judge(*of) if len(asked) > 1 else Judgement(Verdict.FAILED, "a better minimum was met", better=met)
+        return judge(*of) if len(asked) > 1 else Judgement([BETTER_MINIMUM.found("")], better=met)
 
     assert not met.converged
     monkeypatch.setattr("shoal.identification.conclude.judge", judged)
@@ -176,7 +177,7 @@ def test_exchanged_markers_are_rejected() -> None:
     assert identify(stated, method="least-squares", measurement=measurement).verdict is Verdict.IDENTIFIED
     estimate = identify(stated, method="least-squares", measurement=wrong)
     assert estimate.verdict is Verdict.REJECTED
-    assert "markers A and B seem exchanged" in estimate.message
+    assert "markers-exchanged" in estimate.codes
 
 
 def concluded(model: ForwardModel, outcome: Outcome) -> Estimate:
@@ -206,7 +207,7 @@ def test_a_search_that_has_not_ended_has_failed() -> None:
     outcome = Outcome(point, float(model.fitness(point[None])[0]), [], "stopped after 1 s", ended=False)
     estimate = concluded(model, outcome)
     assert estimate.verdict is Verdict.FAILED
-    assert estimate.message == "stopped after 1 s"
+    assert (estimate.codes, estimate.message) == (["search-stopped"], "stopped after 1 s")
 
 
 def test_equal_minima_are_ambiguous_and_whole_turns_are_not() -> None:
@@ -230,4 +231,4 @@ def test_a_real_machine_is_not_rejected_for_a_small_systematic_residual() -> Non
     assert estimate.verdict is Verdict.COMBINATION
     assert estimate.residual_tests.systematic
     assert not estimate.residual_tests.white
-    assert "systematic residual" in estimate.message
+    assert "systematic-residual" in estimate.codes

@@ -17,7 +17,8 @@ from shoal.identification.recording.source import Channel, EngineSource, FileSou
 from shoal.identification.recording.swaps import mend as mend_tracks
 from shoal.scene.record import Record
 
-PAGE = Path(__file__).parents[3] / "docs" / "recordings.md"
+GUIDE = Path(__file__).parents[3] / "docs" / "recordings.md"
+REFERENCE = GUIDE.parent / "reference" / "recordings.md"
 RECORDINGS = Path(__file__).parents[4] / "shared" / "data" / "ibm_double_pendulum"
 VIDEO = FileSource(columns=["Oy", "Ox", "Ay", "Ax", "By", "Bx"], rate=400.0, y_axis="down", swaps=False)
 MARKERS = tuple(Channel(marker=m, quantity=q, column=m + q, unit="px") for m in "OAB" for q in ("x", "y"))  # type: ignore[arg-type]
@@ -202,7 +203,7 @@ def test_a_wrong_description_is_refused_in_one_line(tmp_path: Path, text: str, w
     assert "\n" not in str(refusal.value)
 
 
-EXAMPLES = [yaml.safe_load(text.split("```")[0]) for text in PAGE.read_text().split("```yaml\n")[1:]]
+EXAMPLES = [yaml.safe_load(text.split("```")[0]) for text in GUIDE.read_text().split("```yaml\n")[1:]]
 
 
 @pytest.mark.parametrize("example", [one for one in EXAMPLES if "scene" in one], ids=lambda one: one["name"])
@@ -217,7 +218,7 @@ def test_recordings_of_the_manual_name_their_columns(example: dict[str, object])
 
 @pytest.mark.parametrize("record", [Channel, FileSource, EngineSource, Parameter, Problem, Prior])
 def test_the_manual_names_every_field(record: type[Record]) -> None:
-    words = set(re.findall(r"\w+", " ".join(re.findall(r"`([^`\n]+)`", PAGE.read_text()))))
+    words = set(re.findall(r"\w+", " ".join(re.findall(r"`([^`\n]+)`", REFERENCE.read_text()))))
     assert set(record.model_fields) <= words
 
 

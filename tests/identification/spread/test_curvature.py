@@ -62,7 +62,7 @@ def test_only_a_loud_noise_bends_the_misfit() -> None:
 def test_the_profile_gives_the_interval_and_that_is_said() -> None:
     estimate = found(LOUD, 0)
     assert estimate.profiles
-    assert "no parabola" in estimate.message
+    assert "curved-misfit" in estimate.codes
     for name, seen in estimate.profiles.items():
         known = estimate.parameters[name]
         assert known.lower <= seen.lower < known.value < seen.upper <= known.upper

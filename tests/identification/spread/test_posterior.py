@@ -169,7 +169,7 @@ def test_draws_that_were_stopped_do_not_call_themselves_converged(fall: str, mon
     assert found is not None
     assert not found.converged
     assert found.to_json()["status"] == "not converged"
-    assert "the posterior has not converged: after" in estimate.message
+    assert "posterior-not-converged" in estimate.codes
 
 
 def test_what_cannot_be_simulated_is_impossible_and_counted(fall: str) -> None:
@@ -235,7 +235,7 @@ def test_without_a_minimum_nothing_is_drawn(fall: str) -> None:
     estimate = sampled(problem, short)
     assert estimate.verdict == "failed"
     assert estimate.posterior is None
-    assert "no posterior was drawn: 'failed' is no minimum to draw about" in estimate.message
+    assert "no-posterior" in estimate.codes
 
 
 def test_without_the_sampler_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

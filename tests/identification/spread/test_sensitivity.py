@@ -9,11 +9,12 @@ import pytest
 from scipy.integrate import solve_ivp
 from shoal.engines import get_engine
 from shoal.engines.casadi.shooting import shot
+from shoal.findings import message
 from shoal.identification import Measurement, Problem, Verdict, identify
 from shoal.identification.conclude import NOTHING, conclude
 from shoal.identification.evidence import evidence
 from shoal.identification.forward import ForwardModel
-from shoal.identification.judge.verdict import judge
+from shoal.identification.judge.judgement import judge
 from shoal.identification.lengthening import lengthened
 from shoal.identification.methods.auto import auto
 from shoal.identification.methods.least_squares import differentiate as naive
@@ -129,7 +130,7 @@ def test_intervals_of_a_chaotic_record_rest_on_its_beginning_and_hold(seed: int)
     """Data by scipy's integrator; derivatives of 10 s, and intervals with them, are off by orders of magnitude."""
     problem = rigid_problem()
     found = identify(problem, measurement=textbook(problem, 10.0, 0.01, seed=seed))
-    assert "the intervals rest on the first" in found.message
+    assert "unreliable-derivatives" in found.codes
     for name, true in found.truth.items():
         value = found.parameters[name]
         assert abs(value.value - true) < 4 * value.std
@@ -217,7 +218,8 @@ def test_a_misfit_only_where_no_derivatives_hold_is_not_held_against_the_model(
     assert found.verdict is verdict
     if verdict is Verdict.UNFINISHED:
         assert near.tests.wrong_model
-        assert f"the motion is chaotic: the model fits the first {near.seen.end:.3g} s" in found.message
+        assert found.findings[0].code == "fits-the-beginning-only"
+        assert found.findings[0].numbers["end"] == near.seen.end
         return
     assert not near.tests.wrong_model
     for value, true in zip(values.values(), CHAOTIC, strict=True):
@@ -234,7 +236,8 @@ def test_the_cause_of_derivatives_that_do_not_hold_is_told(magnified: float, cau
     near = evidence(model, np.array([0.5, 0.2]))
     outcome = Outcome(near.point, float(model.cost(near.residual[None])[0]), [], "")
     values = intervals.parameters(model, near.point, near.at, near.correction)
-    assert cause in judge(model, outcome, rough, near.at, near.tests, near.score_test(model), values, []).message
+    judged = judge(model, outcome, rough, near.at, near.tests, near.score_test(model), values, [])
+    assert cause in message(judged.findings)
 
 
 def test_derivatives_that_hold_are_those_of_the_whole_record() -> None:

@@ -11,7 +11,7 @@ import pytest
 import yaml
 from click.testing import CliRunner
 from shoal.cli import main
-from shoal.mechanics.analysis.joint_reactions import JointReaction, Reactions, told
+from shoal.mechanics.analysis.joint_reactions import JointReaction, Reactions, to_json
 from shoal.mechanics.analysis.reactions import reactions
 from shoal.mechanics.analysis.reactions_verified import SHARE, verified
 from shoal.scene import Scene, load_scene
@@ -71,7 +71,7 @@ def test_forces_that_no_two_runs_agree_about_are_inaccurate(monkeypatch: pytest.
         return replace(joint, force=tuple(factor * part for part in joint.force))
 
     monkeypatch.setattr("shoal.mechanics.analysis.reactions_verified.reactions", drifting)
-    report = told(verified(load_scene("single-pendulum"), [0.2]))
+    report = to_json(verified(load_scene("single-pendulum"), [0.2]))
     assert report["status"] == "inaccurate"
     assert "use a smaller solver.step, or solver.integrator=dop853" in report["message"]
     error = report["reactions"][0]["joints"]["O"]["force_error"]

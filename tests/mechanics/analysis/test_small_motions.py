@@ -14,7 +14,7 @@ from shoal.mechanics.analysis.damped import roots
 from shoal.mechanics.analysis.equilibrium import Held
 from shoal.mechanics.analysis.mesh_error import of_modes
 from shoal.mechanics.analysis.modes import modes
-from shoal.mechanics.analysis.small_motions import ROUND, Tangent, hides, spectrum
+from shoal.mechanics.analysis.small_motions import ROUND, BoundedMatrix, hides, spectrum
 from shoal.mechanics.analysis.statics import statics
 from shoal.scene import Scene, load_scene
 
@@ -128,7 +128,7 @@ def test_squared_frequencies_are_known_each_to_its_own_round_off() -> None:
     matrix = np.zeros((5, 5))
     matrix[:2, :2], matrix[2:, 2:] = low, stiff
     mixed = np.linalg.qr(np.random.default_rng(1).normal(size=(5, 5)))[0]
-    found = spectrum(Tangent(matrix, ROUND * np.abs(matrix)), mixed)
+    found = spectrum(BoundedMatrix(matrix, ROUND * np.abs(matrix)), mixed)
     np.testing.assert_allclose(found.values[:2], [1e-9, 3e-9], rtol=1e-4)
     assert np.all(found.levels[:2] < 1e-12)
     np.testing.assert_allclose(found.values[2:], np.linalg.eigvalsh(stiff), rtol=1e-12)
@@ -145,7 +145,7 @@ def test_free_motions_with_and_without_a_damper(damper: float) -> None:
     # Unit masses 0, 1 on a spring of 1e8 and 2 by itself, on a damper.
     stiffness = 1e8 * np.array([[1.0, -1.0, 0.0], [-1.0, 1.0, 0.0], [0.0, 0.0, 0.0]])
     damping = np.diag([0.0, 0.0, damper])
-    tangent, rubbing = (Tangent(part, ROUND * np.abs(part)) for part in (stiffness, damping))
+    tangent, rubbing = (BoundedMatrix(part, ROUND * np.abs(part)) for part in (stiffness, damping))
     found = roots(tangent, rubbing, spectrum(tangent, np.eye(3)), follows=False)
     expected = [0.0, 0.0, *([-damper] if damper else []), np.sqrt(2e8) * 1j]
     np.testing.assert_allclose(found.values, expected, rtol=1e-12)

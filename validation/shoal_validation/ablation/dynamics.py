@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from shoal.engines.swarm_motion import Search, Switches
+from shoal.engines.swarm_motion import SwarmSettings, Switches
 from shoal.mechanics.simulate import simulate
 from shoal.scene import Scene, load_scene
 from shoal.trajectory import Array
@@ -54,7 +54,7 @@ def measure(machine: str, swarm: str, *, seeds: int, steps: int, note: Callable[
         sought = with_solver(scene, swarm).with_values({"solver.swarm_seed": seed})
         for combination in combinations():
             begin = time.process_time()
-            row = cost("", sought, times, true, Search(switches=switches(combination)))
+            row = cost("", sought, times, true, SwarmSettings(switches=switches(combination)))
             seconds = (time.process_time() - begin) / steps
             place: tuple[slice | int, ...] = (slice(None), *map(int, combination), seed)
             table[place] = max(row.error, ROUND_OFF), row.path, row.evaluations, seconds

@@ -23,7 +23,7 @@ from rich.table import Table
 from scipy.integrate import solve_ivp
 from shoal.engines import swarm_motion
 from shoal.engines.capabilities import is_moved_by_swarm
-from shoal.engines.swarm_motion import Search, Switches
+from shoal.engines.swarm_motion import SwarmSettings, Switches
 from shoal.mechanics.simulate import simulate
 from shoal.scene import Scene, load_scene
 from shoal.trajectory import Array, Status, Trajectory
@@ -103,11 +103,11 @@ def measure_cost(scene_name: str, step: float, steps: int, solvers: tuple[str, .
     for solver in SWARMS:
         parts = {"": {}} if solver == "afsa" else {**ABLATIONS, **FORGETFUL.get(solver, {})}
         for name, switches in parts.items():
-            search = Search(switches=Switches(**switches))
+            search = SwarmSettings(switches=Switches(**switches))
             yield cost(", ".join(filter(None, (solver, name))), with_solver(scene, solver), times, true, search)
 
 
-def cost(name: str, scene: Scene, times: Array, true: Trajectory, search: Search | None) -> CostRow:
+def cost(name: str, scene: Scene, times: Array, true: Trajectory, search: SwarmSettings | None) -> CostRow:
     """One row; the time of compiled solvers is taken over more steps, after the call that compiles them."""
     run = simulate(scene, times) if search is None else swarm_motion.simulate(scene, times, search)
     seconds = run.wall_s / run.steps
@@ -138,7 +138,7 @@ def passage(
     end = np.linspace(0.0, duration, 101)[1:]
     scene = _moving(integrator, step, duration).with_values({"solver.project": project, "solver.acceleration": solver})
     if is_moved_by_swarm(scene):
-        run = swarm_motion.simulate(scene, end, Search(switches=Switches(**ABLATIONS[ablation])))
+        run = swarm_motion.simulate(scene, end, SwarmSettings(switches=Switches(**ABLATIONS[ablation])))
     else:
         run = simulate(scene, end)
     place = run.marker("B0")[-1]

@@ -63,7 +63,7 @@ class ChainRow:
 
 def chain(bodies: int) -> SpatialChain:
     """Links of 1 m along x, joints about y and z in turn, at angles of 0.1 sin k."""
-    return SpatialChain.parse(
+    return SpatialChain.model_validate(
         {
             "name": f"chain-{bodies}",
             "gravity": GRAVITY,

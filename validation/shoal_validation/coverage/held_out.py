@@ -4,7 +4,7 @@ Fits windows of the recordings of real machines in the folder DATA (Kaheman's si
 ones of IBM), each all along its recording, holds out the last fifth of every window and counts how many of these are
 predicted as well as the estimate states. Each window is printed as it is done; --record keeps it in a file, so that the
 study goes on where it was stopped. --every N takes every N-th window; all of them take an hour. The table goes to
-standard output and, of all windows, into docs/recordings.md.
+standard output and, of all windows, into docs/verdict-charts.md.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ def report(found: list[tuple[str, Found]]) -> str:
         unfitted = sum("error" in one for one in mine)
         silent = len(mine) - unfitted - len(told)
         rows.append((shown, str(len(mine)), str(held), str(silent), str(unfitted), middle, largest))
-    head = ("recording", "windows", "inside", "no limit told", "not fitted", "median RMS over limit", "largest")
+    head = ("recording", "windows", "inside", "no limit", "not fitted", "median RMS over limit", "largest")
     return f"{table(head, rows)}\n\n{inside} of {windows} are inside, {100 * inside / max(windows, 1):.0f} %."
 
 
@@ -85,7 +85,7 @@ def main(arguments: list[str]) -> None:
     parser.add_argument("data", type=Path)
     parser.add_argument("--record", type=Path, help="file of the windows that are done")
     parser.add_argument("--every", type=int, default=1)
-    parser.add_argument("--page", type=Path, default=Path("docs/recordings.md"))
+    parser.add_argument("--page", type=Path, default=Path("docs/verdict-charts.md"))
     chosen = parser.parse_args(arguments)
 
     def study(key: str) -> Found:

@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 from shoal.selection import Selection, select
 from shoal.selection.levels import LADDERS, Level
-from shoal.selection.refine import PATIENCE, Runs
+from shoal.selection.refine import PATIENCE, LevelRuns
 from shoal.selection.run import Candidate, distance
 
 from shoal_validation.benchmarks.timing import undisturbed
@@ -108,7 +108,7 @@ def _stiffness(machine: Draw) -> float:
 def _cheapest(machine: Draw, chosen: Selection, reference: Candidate) -> tuple[float, str]:
     """The least work within the tolerance among all combinations of levels, without capped inertia."""
     rods, least = tuple(chosen.chosen.levels), _uncapped(chosen)
-    runs = Runs(chosen.chosen.scene, reference.trajectory.times, chosen.limits, lambda _: None)
+    runs = LevelRuns(chosen.chosen.scene, reference.trajectory.times, chosen.limits, lambda _: None)
     cheaper: list[tuple[float, dict[str, Level]]] = []
     ladders = ([level for level in LADDERS[chosen.limits[rod]] if runs.knows(rod, level)] for rod in rods)
     for levels in product(*ladders):

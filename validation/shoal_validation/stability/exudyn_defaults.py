@@ -12,7 +12,7 @@ from scipy.interpolate import CubicHermiteSpline
 from shoal.engines.capabilities import require
 from shoal.engines.contract import Capabilities, sampling_times
 from shoal.engines.exudyn import ExudynEngine
-from shoal.engines.exudyn.build import Machine, build, library
+from shoal.engines.exudyn.build import ExudynSystem, build, library
 from shoal.scene import Scene
 from shoal.trajectory import Array, Status, Trajectory
 
@@ -71,7 +71,7 @@ class ExudynDefaults:
         raise NotImplementedError
 
 
-def _solve(exu: Any, machine: Machine, end: float, step: float) -> tuple[list[tuple[float, Array, Array]], str]:
+def _solve(exu: Any, machine: ExudynSystem, end: float, step: float) -> tuple[list[tuple[float, Array, Array]], str]:
     """Times [s], coordinates and rates after every step, and why the run ended early (empty if it did not)."""
     settings = exu.SimulationSettings()
     settings.solution.file.write = False

@@ -3,9 +3,9 @@
 
 Prints accuracy by number of runs of every method for intervals on every problem (`methods`), N random studies of
 machines in closed form by `auto`, whose bounds 100 000 random runs try to leave (`studies`), and ten scenes of other
-shapes whose bounds a fiftieth of these runs try (`scenes`), what must be reached and is (`reached`), and draws how far
-ahead every method tells bounds (`map`); writes all into FILE (docs/uncertain.md). Two hours; quick: 20 studies of at
-most three parameters, the problems of one, demands of few seconds, and a map of up to two.
+shapes whose bounds a fiftieth of these runs try (`scenes`), demands (`reached`), and draws how far ahead the bounds of
+every method are right (`map`); writes all into FILE (docs/uncertain-charts.md). Two hours; quick: 20 studies of at most
+three parameters, the problems of one, demands of few seconds, and a map of up to two.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def main(arguments: list[str]) -> bool:
     parser.add_argument("--only", choices=["methods", "studies", "scenes", "reached", "map"])
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--chart", type=Path, default=Path("docs/charts/uncertain-map.png"))
-    parser.add_argument("--page", type=Path, default=Path("docs/uncertain.md"))
+    parser.add_argument("--page", type=Path, default=Path("docs/uncertain-charts.md"))
     parser.add_argument("--record", type=Path, help="keeps the studies that are done, so that they can go on")
     chosen = parser.parse_args(arguments)
     told, good = {}, True
@@ -153,7 +153,7 @@ def studies_text(studies: Sequence[Judged], runs: int) -> str:
     return (
         f"Of {len(studies)} random studies of {kinds} machines with one to {most} intervals of 0.5 to 30 % after "
         f"0.3 to 300 cycles, {left} state outer bounds that one of {runs} random runs exceeds within the horizon by "
-        f"more than the gap told. {len(whole)} hold at all instants (median {middle_runs} runs, gap {middle_gap:.0e}); "
+        f"more than the gap. {len(whole)} hold at all instants (median {middle_runs} runs, gap {middle_gap:.0e}); "
         f"there the furthest run lies {furthest:.0e} of the width beyond. The other {len(studies) - len(whole)} end at "
         "a horizon and say so."
     )

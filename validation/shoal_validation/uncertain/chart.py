@@ -81,6 +81,6 @@ def findings(cells: Sequence[Cell]) -> str:
         rows.append(
             [method, *map(str, (len(mine), whole, untold, refused, sum(one.silent for one in mine))), f"{middle:.2g}"]
         )
-    head = ["method", "cells", "right to the end", "tells no outer bounds", "refused", "wrong in silence",
+    head = ["method", "cells", "right to the end", "no outer bounds", "refused", "wrong in silence",
             "median horizon [cycles]"]  # fmt: skip
     return table(head, rows)

@@ -14,8 +14,7 @@ from typing import Any
 
 import numpy as np
 from shoal.engines import get_engine
-from shoal.notebook import uncertain
-from shoal.response import Response
+from shoal.response import Response, uncertain
 from shoal.scene import Scene, load_scene
 from shoal.trajectory import Array, Status
 
@@ -230,7 +229,7 @@ STUDIES = (
         (0.05, 0.1, 0.15, 0.2, 0.3),
     ),
     Asked(
-        "a slider-crank that passes its singular place",
+        "a slider-crank that passes its singular position",
         "equal-slider-crank",
         {"bodies.crank.mass": (0.5, 1.5), "bodies.rod.mass": (0.5, 1.5), "initial.crank.rate": (5.9, 6.0)},
         _AFTER[:4],

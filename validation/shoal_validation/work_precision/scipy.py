@@ -9,7 +9,8 @@ from typing import Literal
 import numpy as np
 from scipy.integrate import solve_ivp
 from shoal.errors import ComputationError, InputError
-from shoal.mechanics.analysis.evaluate import Evaluator, points
+from shoal.mechanics.affine import points
+from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.assembly.placement import place
 from shoal.scene import Scene
 from shoal.trajectory import Array

@@ -14,7 +14,7 @@ from shoal.scene import Rod
 from shoal.scene.record import Vector
 
 
-class Placed(Protocol):
+class PlacedBody(Protocol):
     """A body or the ground, whose places are expressions in the coordinates q."""
 
     def point(self, place: Vector) -> Any:

@@ -10,7 +10,7 @@ import numpy as np
 
 from shoal.engines.capabilities import of_kind
 from shoal.engines.casadi.bodies import PlacedCable
-from shoal.engines.casadi.tree import Tree
+from shoal.engines.casadi.tree import PlacedTree
 from shoal.engines.poses import initial_poses, start_of
 from shoal.errors import InputError
 from shoal.scene import (
@@ -46,7 +46,7 @@ def with_rest(scene: Scene) -> Scene:
     return scene.model_copy(update={"loads": loads})
 
 
-def stored(scene: Scene, tree: Tree) -> Any:
+def stored(scene: Scene, tree: PlacedTree) -> Any:
     """Energy of the springs [J]."""
     energy = ca.SX(0)
     for load, x in _springs(scene, tree):
@@ -54,7 +54,7 @@ def stored(scene: Scene, tree: Tree) -> Any:
     return energy
 
 
-def dissipation(scene: Scene, tree: Tree, v: Any) -> Any:
+def dissipation(scene: Scene, tree: PlacedTree, v: Any) -> Any:
     """A function D of the velocities whose gradient is what friction and dampers resist with [W].
 
     Rayleigh's c w^2 / 2 for viscous friction, c |w|^3 / 3 for drag; F w0 log cosh(w / w0) for Coulomb's, smoothed as
@@ -76,7 +76,7 @@ def dissipation(scene: Scene, tree: Tree, v: Any) -> Any:
     return total
 
 
-def applied(scene: Scene, tree: Tree) -> Any:
+def applied(scene: Scene, tree: PlacedTree) -> Any:
     """Generalised forces of the applied loads, all constant but for the direction of following ones, (unknowns,)."""
     total = ca.SX.zeros(tree.coordinates.numel())
     for name, load in scene.loads.items():
@@ -85,7 +85,7 @@ def applied(scene: Scene, tree: Tree) -> Any:
     return total
 
 
-def _force(scene: Scene, tree: Tree, where: str, load: Force) -> Any:
+def _force(scene: Scene, tree: PlacedTree, where: str, load: Force) -> Any:
     assert load.scale.number is not None
     force = load.scale.number * ca.SX(load.force)
     if load.follows:
@@ -95,7 +95,7 @@ def _force(scene: Scene, tree: Tree, where: str, load: Force) -> Any:
     return ca.jtimes(point, tree.coordinates, force, True)
 
 
-def _torque(scene: Scene, tree: Tree, where: str, load: Torque) -> Any:
+def _torque(scene: Scene, tree: PlacedTree, where: str, load: Torque) -> Any:
     assert load.torque.number is not None
     turn = _angle(scene, tree, where, load.at)
     if load.reaction is not None:
@@ -103,33 +103,33 @@ def _torque(scene: Scene, tree: Tree, where: str, load: Torque) -> Any:
     return load.torque.number * ca.gradient(turn, tree.coordinates)
 
 
-def _distributed(scene: Scene, tree: Tree, where: str, load: DistributedForce) -> Any:
+def _distributed(scene: Scene, tree: PlacedTree, where: str, load: DistributedForce) -> Any:
     assert load.scale.number is not None
     way = ca.dot(load.scale.number * ca.SX(load.force), _integral(scene, tree, load.body))
     return ca.gradient(way, tree.coordinates)
 
 
-FORCES: dict[str, Callable[[Scene, Tree, str, Any], Any]] = {
+FORCES: dict[str, Callable[[Scene, PlacedTree, str, Any], Any]] = {
     "force": _force,
     "torque": _torque,
     "distributed-force": _distributed,
 }
 
 
-def _springs(scene: Scene, tree: Tree) -> Iterator[tuple[Any, Any]]:
+def _springs(scene: Scene, tree: PlacedTree) -> Iterator[tuple[Any, Any]]:
     """The springs, each with its length or angle from rest [m or rad]."""
     for name, load in scene.loads.items():
         if load.kind in ELONGATIONS:
             yield load, ELONGATIONS[load.kind](scene, tree, f"loads.{name}", load)
 
 
-def _stretch(scene: Scene, tree: Tree, where: str, load: Spring) -> Any:
+def _stretch(scene: Scene, tree: PlacedTree, where: str, load: Spring) -> Any:
     """Length from rest [m]."""
     first, second = (tree.placed[side.body].point(scene.location(side)) for side in (load.first, load.second))
     return ca.norm_2(second - first) - load.length
 
 
-def _twist(scene: Scene, tree: Tree, where: str, load: TorsionSpring) -> Any:
+def _twist(scene: Scene, tree: PlacedTree, where: str, load: TorsionSpring) -> Any:
     """Angle from rest [rad]."""
     first, second = (_angle(scene, tree, where, side) for side in (load.first, load.second))
     x = second - first - load.angle
@@ -138,10 +138,10 @@ def _twist(scene: Scene, tree: Tree, where: str, load: TorsionSpring) -> Any:
     return ca.atan2(ca.sin(x), ca.cos(x)) if flexible else x
 
 
-ELONGATIONS: dict[str, Callable[[Scene, Tree, str, Any], Any]] = {"spring": _stretch, "torsion-spring": _twist}
+ELONGATIONS: dict[str, Callable[[Scene, PlacedTree, str, Any], Any]] = {"spring": _stretch, "torsion-spring": _twist}
 
 
-def _integral(scene: Scene, tree: Tree, body: str) -> Any:
+def _integral(scene: Scene, tree: PlacedTree, body: str) -> Any:
     """Integral of the position along a rod [m^2], (2,)."""
     placed, rod = tree.placed[body], scene.bodies[body]
     assert isinstance(rod, Rod)
@@ -153,7 +153,7 @@ def _integral(scene: Scene, tree: Tree, body: str) -> Any:
     return rod.length * placed.point((middle.real, middle.imag))
 
 
-def _angle(scene: Scene, tree: Tree, where: str, side: Attachment) -> Any:
+def _angle(scene: Scene, tree: PlacedTree, where: str, side: Attachment) -> Any:
     if isinstance(scene.bodies.get(side.body), PointMass):
         raise InputError(f"{where}: {side.body} is a point mass, which has no angle")
     return tree.placed[side.body].angle(scene.location(side))

@@ -12,7 +12,7 @@ import numpy as np
 
 from shoal.engines.casadi.bodies import PlacedCable
 from shoal.engines.casadi.loads import applied, dissipation, stored, with_rest
-from shoal.engines.casadi.tree import Tree, build_tree
+from shoal.engines.casadi.tree import PlacedTree, build_tree
 from shoal.scene import PointMass, Scene, Solver
 from shoal.trajectory import Array
 
@@ -95,7 +95,7 @@ def _solve(mass: Any, force: Any) -> Any:
     return ca.ldl_solve(force, *ca.ldl(mass))
 
 
-def _kinetic(scene: Scene, tree: Tree, v: Any) -> Any:
+def _kinetic(scene: Scene, tree: PlacedTree, v: Any) -> Any:
     energy = ca.SX(0)
     for name, body in scene.bodies.items():
         placed = tree.placed[name]
@@ -112,7 +112,7 @@ def _kinetic(scene: Scene, tree: Tree, v: Any) -> Any:
     return energy
 
 
-def _elastic(tree: Tree) -> Any:
+def _elastic(tree: PlacedTree) -> Any:
     energy = ca.SX(0)
     for placed in tree.placed.values():
         if isinstance(placed, PlacedCable):
@@ -123,7 +123,7 @@ def _elastic(tree: Tree) -> Any:
     return energy
 
 
-def _gravity(scene: Scene, tree: Tree) -> Any:
+def _gravity(scene: Scene, tree: PlacedTree) -> Any:
     moment = ca.SX.zeros(2)
     for name, body in scene.bodies.items():
         placed = tree.placed[name]

@@ -15,7 +15,7 @@ import casadi as ca
 import numpy as np
 
 from shoal.engines.capabilities import of_kind
-from shoal.engines.casadi.bodies import Placed, PlacedCable, PlacedRigid, cable_place, turned
+from shoal.engines.casadi.bodies import PlacedBody, PlacedCable, PlacedRigid, cable_place, turned
 from shoal.engines.casadi.element import cable_element
 from shoal.errors import InputError
 from shoal.scene import GROUND, Attachment, PointMass, Revolute, RigidBody, Rod, Scene
@@ -23,7 +23,7 @@ from shoal.scene.record import Vector
 
 
 @dataclass(frozen=True)
-class Tree:
+class PlacedTree:
     """All bodies of a scene, placed.
 
     placed: the ground and every body by name
@@ -35,7 +35,7 @@ class Tree:
     length: length of that chain up to the body's entry [m]
     """
 
-    placed: dict[str, Placed]
+    placed: dict[str, PlacedBody]
     coordinates: Any
     angles: Any
     start: Any
@@ -44,9 +44,9 @@ class Tree:
     length: dict[str, float]
 
 
-def build_tree(scene: Scene) -> Tree:
+def build_tree(scene: Scene) -> PlacedTree:
     """Place every body of a scene of open chains, which `capabilities.require` has accepted."""
-    ground: Placed = PlacedRigid(ca.SX.zeros(2), ca.SX(0))
+    ground: PlacedBody = PlacedRigid(ca.SX.zeros(2), ca.SX(0))
     placed, straight = {GROUND: ground}, {GROUND: ground}
     entry: dict[str, Vector] = {}
     root: dict[str, Vector] = {}
@@ -67,7 +67,7 @@ def build_tree(scene: Scene) -> Tree:
         on_ground = parent.body == GROUND
         root[name] = outer if on_ground else root[parent.body]
         length[name] = 0.0 if on_ground else length[parent.body] + math.dist(outer, entry[parent.body])
-    return Tree(
+    return PlacedTree(
         placed=placed,
         coordinates=ca.vertcat(*coordinates),
         angles=ca.vertcat(*angles.values()),
@@ -95,7 +95,7 @@ def _links(scene: Scene) -> Iterator[tuple[Attachment, Attachment]]:
 
 def _place_rigid(
     name: str, body: Rod | RigidBody | PointMass, inner: Vector, anchor: Any, rest: PlacedRigid
-) -> tuple[Placed, list[Any], list[Any]]:
+) -> tuple[PlacedBody, list[Any], list[Any]]:
     if isinstance(body, PointMass):
         return PlacedRigid(anchor, ca.SX(0)), [], []
     angle = ca.SX.sym(f"{name}_angle")
@@ -104,7 +104,7 @@ def _place_rigid(
 
 def _place_cable(
     name: str, rod: Rod, inner: Vector, anchor: Any, rest: PlacedRigid
-) -> tuple[Placed, list[Any], list[Any]]:
+) -> tuple[PlacedBody, list[Any], list[Any]]:
     """The held node's position follows from the anchor, because the Hermite field is linear in it."""
     h, knots = rod.length / rod.elements, range(rod.elements + 1)
     index, s = cable_place(rod, inner)
@@ -125,7 +125,7 @@ def _place_cable(
     return PlacedCable(rod, _nodes(positions, slopes)), unknowns, straight
 
 
-ELEMENTS: dict[str, Callable[..., tuple[Placed, list[Any], list[Any]]]] = {
+ELEMENTS: dict[str, Callable[..., tuple[PlacedBody, list[Any], list[Any]]]] = {
     "rigid": _place_rigid,
     "ancf-cable": _place_cable,
 }

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from shoal.engines.exudyn.bodies import Energy, Motion, Part, Place, System
+from shoal.engines.exudyn.bodies import BodyPart, Energy, Place, PointMotion, System
 from shoal.engines.exudyn.chain import Chain, cross, gauss
 from shoal.engines.poses import InitialPose
 from shoal.engines.sections import Sections
@@ -22,7 +22,7 @@ from shoal.trajectory import Array
 
 
 @dataclass(frozen=True)
-class BeamPart(Chain, Part):
+class BeamPart(Chain, BodyPart):
     """A chain of three-node ObjectBeamGeometricallyExact2D; coordinates of a node: r and the section's angle."""
 
     nodes: list[Any]
@@ -70,12 +70,12 @@ class BeamPart(Chain, Part):
             raise InputError("joints: engine exudyn-ge keeps no angle of a flexible rod but 0; use exudyn")
         return system.add("MarkerNodeRigid", nodeNumber=self.nodes[index])
 
-    def motion(self, q: Array, v: Array, place: Place) -> Motion:
+    def motion(self, q: Array, v: Array, place: Place) -> PointMotion:
         """See Part."""
         index, xi = self.find(place)
         shape, _ = self._shapes(np.array([xi]))
         here, speed = self.values(shape, q)[:, index, 0], self.values(shape, v)[:, index, 0]
-        return Motion(here[:, :2], speed[:, :2], here[:, 2], speed[:, 2])
+        return PointMotion(here[:, :2], speed[:, :2], here[:, 2], speed[:, 2])
 
     def energy(self, q: Array, v: Array) -> Energy:
         """See Part."""

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from shoal.engines.course import Clock, Course
+from shoal.engines.course import Clock, PiecewiseFunction
 from shoal.engines.poses import InitialPose, normal
 from shoal.errors import InputError
 from shoal.scene import Function, PointMass, RigidBody, Rod
@@ -23,7 +23,7 @@ from shoal.trajectory import Array
 Place = tuple[float, ...]
 
 
-class Motion(NamedTuple):
+class PointMotion(NamedTuple):
     """One material point: position [m] and velocity [m/s] (rows, 2), direction [rad] and rate [rad/s], (rows,).
 
     The direction lies in (-pi, pi] or is continuous.
@@ -57,12 +57,12 @@ class Holder(Protocol):
         """A new marker that turns with it there, `angle` [rad] ahead. Raises InputError."""
         ...
 
-    def motion(self, q: Array, v: Array, place: Place) -> Motion:
+    def motion(self, q: Array, v: Array, place: Place) -> PointMotion:
         """Motion of a place."""
         ...
 
 
-class Part(Holder, Protocol):
+class BodyPart(Holder, Protocol):
     """One body of the scene."""
 
     def energy(self, q: Array, v: Array) -> Energy:
@@ -102,7 +102,7 @@ class System:
         self.unknowns += len(columns)
         return self.add(kind, referenceCoordinates=begin, initialVelocities=rates), columns
 
-    def course(self, f: Function, field: str, *, held: bool = False) -> Course:
+    def course(self, f: Function, field: str, *, held: bool = False) -> PiecewiseFunction:
         """A function of time, as the clock has it. Raises InputError that names the field."""
         try:
             return self.clock.course(f, held=held)
@@ -130,7 +130,7 @@ class System:
 
 
 @dataclass(frozen=True)
-class RigidPart(Part):
+class RigidPart(BodyPart):
     """ObjectRigidBody2D, its node at the origin of the body's frame: zero inertia about the centre of mass is legal.
 
     A point mass is a rigid body held at its centre of mass, where nothing turns it; its inertia is of no consequence.
@@ -170,11 +170,11 @@ class RigidPart(Part):
         """See Part."""
         return system.turned(self.body, place, angle)
 
-    def motion(self, q: Array, v: Array, place: Place) -> Motion:
+    def motion(self, q: Array, v: Array, place: Place) -> PointMotion:
         """See Part."""
         x, y, angle = self.columns
         arm = self._arm(q, place)
-        return Motion(q[:, [x, y]] + arm, v[:, [x, y]] + v[:, [angle]] * normal(arm), q[:, angle], v[:, angle])
+        return PointMotion(q[:, [x, y]] + arm, v[:, [x, y]] + v[:, [angle]] * normal(arm), q[:, angle], v[:, angle])
 
     def energy(self, q: Array, v: Array) -> Energy:
         """See Part."""

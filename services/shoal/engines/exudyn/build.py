@@ -13,10 +13,10 @@ import numpy as np
 from shoal.engines.capabilities import of_kind
 from shoal.engines.course import Clock
 from shoal.engines.exudyn.beam import BeamPart
-from shoal.engines.exudyn.bodies import Holder, Part, RigidPart, System
+from shoal.engines.exudyn.bodies import BodyPart, Holder, RigidPart, System
 from shoal.engines.exudyn.cable import CablePart
 from shoal.engines.exudyn.connectors import Exchange
-from shoal.engines.exudyn.ends import Ends
+from shoal.engines.exudyn.ends import SystemAttachments
 from shoal.engines.exudyn.ground import GroundPart, add_moving_point
 from shoal.engines.exudyn.joints import Gap, add_friction, add_joint
 from shoal.engines.exudyn.loads import add_load
@@ -58,7 +58,7 @@ def silence(exu: Any) -> Iterator[None]:
 
 
 @dataclass(frozen=True)
-class Machine:
+class ExudynSystem:
     """An assembled system and the parts that read its coordinates."""
 
     scene: Scene
@@ -68,7 +68,7 @@ class Machine:
     """Owns the system; Exudyn frees both when it goes."""
     clock: Clock
     """The functions of time, and where steps end because of them."""
-    parts: dict[str, Part]
+    parts: dict[str, BodyPart]
     gaps: list[Gap]
     exchanges: list[Exchange]
     """Springs, friction and applied loads."""
@@ -124,7 +124,9 @@ class Machine:
         return np.asarray(sum((part.damping(q, v) for part in self.parts.values()), power))
 
 
-def build(exu: Any, scene: Scene, beam: Beam, end: float | None = None, system_of: type[System] = System) -> Machine:
+def build(
+    exu: Any, scene: Scene, beam: Beam, end: float | None = None, system_of: type[System] = System
+) -> ExudynSystem:
     """Enter bodies, gravity, joints and loads at the initial state. Raises InputError for a joint that is open.
 
     end [s]: of the run, beyond the scene's duration if at all; system_of: what the items are entered into.
@@ -136,7 +138,7 @@ def build(exu: Any, scene: Scene, beam: Beam, end: float | None = None, system_o
     mbs = container.AddSystem()
     clock = Clock(max(end or 0.0, scene.solver.duration), scene.solver.step)
     system = system_of(mbs, items, scene.gravity, clock)
-    parts: dict[str, Part] = {}
+    parts: dict[str, BodyPart] = {}
     for name, body in scene.bodies.items():
         system.enter(f"bodies.{name}")
         part = of_kind(PARTS[beam], body.element, f"bodies.{name}.element")
@@ -148,11 +150,11 @@ def build(exu: Any, scene: Scene, beam: Beam, end: float | None = None, system_o
         name = moving(point)
         system.enter(f"ground_points.{point}")
         places[name] = add_moving_point(system, ground, point, path, poses[name])
-    ends = Ends(scene, system, places, poses)
+    ends = SystemAttachments(scene, system, places, poses)
     gaps = [add_joint(ends, name, joint) for name, joint in scene.joints.items()]
     friction = (add_friction(ends, name, joint) for name, joint in scene.joints.items())
     exchanges = [exchange for exchange in friction if exchange is not None]
     exchanges += [add_load(ends, name, load) for name, load in scene.loads.items()]
     mbs.Assemble()
     reference = mbs.systemData.GetODE2Coordinates(configuration=exu.ConfigurationType.Reference)
-    return Machine(scene, system, mbs, container, clock, parts, gaps, exchanges, span(scene), np.array(reference))
+    return ExudynSystem(scene, system, mbs, container, clock, parts, gaps, exchanges, span(scene), np.array(reference))

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from shoal.engines.exudyn.bodies import Energy, Motion, Part, Place, System
+from shoal.engines.exudyn.bodies import BodyPart, Energy, Place, PointMotion, System
 from shoal.engines.exudyn.chain import Chain, cross, gauss
 from shoal.engines.poses import InitialPose, normal
 from shoal.engines.sections import Sections
@@ -52,7 +52,7 @@ def add_cables(
 
 
 @dataclass(frozen=True)
-class CablePart(Chain, Part):
+class CablePart(Chain, BodyPart):
     """A chain of ObjectANCFCable2D; coordinates of a node: r and r'.
 
     rest: the nodal vectors of the unstrained elements, (elements, 4, 2).
@@ -88,14 +88,14 @@ class CablePart(Chain, Part):
         index, xi = self.find(place)
         return system.turned(self.elements[index], ((1 + xi) * self.size / 2, 0.0), angle)
 
-    def motion(self, q: Array, v: Array, place: Place) -> Motion:
+    def motion(self, q: Array, v: Array, place: Place) -> PointMotion:
         """See Part."""
         index, xi = self.find(place)
         shape, slope, _ = self._shapes(np.array([xi]))
         position, velocity = (self.values(shape, x)[:, index, 0] for x in (q, v))
         tangent, turn = (self.values(slope, x)[:, index, 0] for x in (q, v))
         rate = cross(tangent, turn) / np.sum(tangent**2, axis=1)
-        return Motion(position, velocity, np.arctan2(tangent[:, 1], tangent[:, 0]), rate)
+        return PointMotion(position, velocity, np.arctan2(tangent[:, 1], tangent[:, 0]), rate)
 
     def energy(self, q: Array, v: Array) -> Energy:
         """See Part."""

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shoal.engines.exudyn.build import Machine
-from shoal.engines.exudyn.record import Indices, Record
+from shoal.engines.exudyn.build import ExudynSystem
+from shoal.engines.exudyn.record import Indices, KeptStates
 from shoal.mechanics.reach import MARGIN, distance_to_ground, reach
 from shoal.mechanics.start.rigid_bodies import lead
 from shoal.trajectory import Array, Status
@@ -19,7 +19,7 @@ INSTANTS = 400
 
 
 @dataclass(frozen=True)
-class Verdict:
+class RunCheck:
     """Marker motion of one run and what to think of it.
 
     points [m], (samples, markers, d); angles [rad], (samples, markers); velocities [m/s] and rates [rad/s] likewise,
@@ -36,7 +36,7 @@ class Verdict:
     gap: float
 
 
-def judge(machine: Machine, record: Record, failure: str) -> Verdict:
+def judge(machine: ExudynSystem, record: KeptStates, failure: str) -> RunCheck:
     """Read the markers and check the run; `failure` is what the solver said, empty where it was content."""
     points, angles, velocities, rates = _markers(machine, record)
     rows = np.unique(np.linspace(0, len(record.q) - 1, INSTANTS).astype(int))
@@ -61,10 +61,10 @@ def judge(machine: Machine, record: Record, failure: str) -> Verdict:
         status, message = Status.DRIFTED, f"a joint opened by {gap:.3g} m; reduce solver.step"
     elif drift > tolerance:
         status, message = Status.ENERGY, f"energy is off by {drift:.3g}, allowed is {tolerance:.3g}; reduce solver.step"
-    return Verdict(points, angles, velocities, rates, status, message, drift, gap)
+    return RunCheck(points, angles, velocities, rates, status, message, drift, gap)
 
 
-def _markers(machine: Machine, record: Record) -> tuple[Array, Array, Array | None, Array | None]:
+def _markers(machine: ExudynSystem, record: KeptStates) -> tuple[Array, Array, Array | None, Array | None]:
     """Points, angles, velocities and rates; the last two in the plane."""
     scene, samples = machine.scene, record.at_wanted()
     angles, motions = [], []
@@ -87,7 +87,7 @@ def _turns(angle: Array) -> Array:
     return 2 * np.pi * np.round(angle / (2 * np.pi))
 
 
-def _energy_drift(machine: Machine, record: Record, rows: Indices, energy: Array, moving: Array) -> float:
+def _energy_drift(machine: ExudynSystem, record: KeptStates, rows: Indices, energy: Array, moving: Array) -> float:
     # Where a load jumps, steps begin on its right side and end on its left.
     sides = (record.times, np.nextafter(record.times, 0.0))
     right, left = (machine.lost_power(side, record.q, record.v) for side in sides)

@@ -11,7 +11,7 @@ import numpy as np
 from shoal.engines.exudyn import user
 from shoal.engines.exudyn.bodies import System
 from shoal.engines.exudyn.chain import cross
-from shoal.engines.exudyn.ends import Ends
+from shoal.engines.exudyn.ends import SystemAttachments
 from shoal.mechanics.fitting import fit_law
 from shoal.scene import Attachment, Function, Resisted
 from shoal.trajectory import Array
@@ -30,7 +30,7 @@ class Exchange(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Law:
+class ForceLaw:
     """Force [N or N m] of an elongation x [m or rad] and its rate.
 
     It is k x + k3 x^3 + table(x) + c x' + c2 |x'| x' + F tanh(x'/v).
@@ -45,7 +45,7 @@ class Law:
     elastic: Function | None = None
 
     @classmethod
-    def of(cls, joint: Resisted) -> Law:
+    def of(cls, joint: Resisted) -> ForceLaw:
         """With which a joint resists its rate."""
         return cls(damping=joint.friction, drag=joint.drag, coulomb=joint.coulomb, speed=joint.coulomb_speed)
 
@@ -76,7 +76,9 @@ class Law:
         return options
 
 
-def add_spring(ends: Ends, first: Attachment, second: Attachment, law: Law, length: float | None) -> Exchange:
+def add_spring(
+    ends: SystemAttachments, first: Attachment, second: Attachment, law: ForceLaw, length: float | None
+) -> Exchange:
     """Enter a law over the distance of two places; length: where x is 0 [m], else that of the start."""
 
     def measure(q: Array, v: Array) -> tuple[Array, Array]:
@@ -95,7 +97,9 @@ def add_spring(ends: Ends, first: Attachment, second: Attachment, law: Law, leng
     return exchange_of(law, lambda q, v: (measure(q, v)[0] - rest, measure(q, v)[1]))
 
 
-def add_torsion(ends: Ends, first: Attachment, second: Attachment, law: Law, angle: float | None) -> Exchange:
+def add_torsion(
+    ends: SystemAttachments, first: Attachment, second: Attachment, law: ForceLaw, angle: float | None
+) -> Exchange:
     """Enter a law over the angle between two bodies; angle: where x is 0 [rad], else that of the start."""
     start = ends.start_turn(first, second)
     rest = start if angle is None else angle
@@ -119,7 +123,9 @@ def add_torsion(ends: Ends, first: Attachment, second: Attachment, law: Law, ang
     return exchange_of(law, measure)
 
 
-def add_rail(ends: Ends, first: Attachment, second: Attachment, direction: float, law: Law) -> Exchange:
+def add_rail(
+    ends: SystemAttachments, first: Attachment, second: Attachment, direction: float, law: ForceLaw
+) -> Exchange:
     """Enter a law over the way along a line of the first body; direction: its angle [rad] in that body."""
     ends.system.add(
         "ObjectConnectorLinearSpringDamper",
@@ -138,7 +144,7 @@ def add_rail(ends: Ends, first: Attachment, second: Attachment, direction: float
     return exchange_of(law, measure)
 
 
-def exchange_of(law: Law, measure: Callable[[Array, Array], tuple[Array, Array]]) -> Exchange:
+def exchange_of(law: ForceLaw, measure: Callable[[Array, Array], tuple[Array, Array]]) -> Exchange:
     """Return the energy balance of a law; measure: its argument [m or rad] and the rate of that, from q and v."""
 
     def lost(t: Array, q: Array, v: Array) -> Array:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from shoal.engines.exudyn.bodies import Holder, Motion, Place, System
+from shoal.engines.exudyn.bodies import Holder, Place, PointMotion, System
 from shoal.engines.exudyn.chain import Chain
 from shoal.engines.poses import InitialPose, owner, start_of
 from shoal.errors import InputError
@@ -17,7 +17,7 @@ from shoal.trajectory import Array
 
 
 @dataclass(frozen=True)
-class Ends:
+class SystemAttachments:
     """Attachments of a scene on the parts of a system; poses: where the parts start."""
 
     scene: Scene
@@ -45,7 +45,7 @@ class Ends:
             return [self.turn(first, turn), self.turn(second)]
         return [self.turn(first), self.turn(second, -turn)]
 
-    def motion(self, at: Attachment, q: Array, v: Array) -> Motion:
+    def motion(self, at: Attachment, q: Array, v: Array) -> PointMotion:
         """Return the motion of an attachment."""
         part, place = self.part(at)
         return part.motion(q, v, place)

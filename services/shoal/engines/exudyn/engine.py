@@ -12,11 +12,11 @@ import numpy as np
 from shoal.engines.capabilities import of_kind, require
 from shoal.engines.contract import Capabilities, sampling_times
 from shoal.engines.exudyn.bodies import System
-from shoal.engines.exudyn.build import PARTS, Beam, Machine, build, library, silence
+from shoal.engines.exudyn.build import PARTS, Beam, ExudynSystem, build, library, silence
 from shoal.engines.exudyn.checks import judge
 from shoal.engines.exudyn.joints import JOINTS
 from shoal.engines.exudyn.loads import LOADS
-from shoal.engines.exudyn.record import Record, Steps, choose_steps
+from shoal.engines.exudyn.record import KeptStates, Steps, choose_steps
 from shoal.engines.exudyn.space.build import build_in_space
 from shoal.engines.exudyn.space.joints import SPATIAL_JOINTS
 from shoal.engines.interrupts import interruptible
@@ -32,7 +32,7 @@ DENSE_LIMIT = 60
 """Unknowns beyond which the sparse linear solver is the faster one."""
 REDUNDANT = 0.9
 """Spectral radius for machines in space whose constraints depend on each other, unless the scene says its own."""
-ROUND_OFF = 32.0 * float(np.finfo(float).eps)
+FORCE_FLOOR = 32.0 * float(np.finfo(float).eps)
 """Of the forces of a machine, over their size; cables and beams of 4 to 16 elements end a step at 1 to 10 eps."""
 MOST = 1e5
 """Most steps that a run takes because of narrow parts of a force law."""
@@ -113,7 +113,7 @@ class ExudynEngine(OneByOne):
         end = float(wanted[-1])
         machine = self.machine(exu, scene, end)
         steps = choose_steps(wanted, scene.solver.step, machine.unknowns, machine.clock.halts)
-        record = Record(steps, machine.reference)
+        record = KeptStates(steps, machine.reference)
         failure = self._run(exu, machine, record)
         if (much := _too_far(machine, record)) > 1.0:
             # As the native solver does, but with all steps.
@@ -140,13 +140,15 @@ class ExudynEngine(OneByOne):
             model=self._model(exu, machine, steps) | facts(scene, machine.scene.initial, machine.span),
         )
 
-    def machine(self, exu: Any, scene: Scene, end: float | None = None, system_of: type[System] = System) -> Machine:
+    def machine(
+        self, exu: Any, scene: Scene, end: float | None = None, system_of: type[System] = System
+    ) -> ExudynSystem:
         """The scene as a system of Exudyn's, for runs up to `end` [s]; system_of: see `build`. Raises InputError."""
         if scene.dimensions == 3:
             return build_in_space(exu, scene, self.beam, end, system_of)
         return build(exu, scene, self.beam, end, system_of)
 
-    def _run(self, exu: Any, machine: Machine, record: Record) -> str:
+    def _run(self, exu: Any, machine: ExudynSystem, record: KeptStates) -> str:
         """Integrate, filling the record. Returns why it ended early, or nothing."""
         if record.steps.count == 0:
             record.take(machine.mbs, 0.0)
@@ -175,7 +177,7 @@ class ExudynEngine(OneByOne):
         reached = record.steps.instants[min(max(record.seen - 1, 0), record.steps.count)]
         return f"exudyn: {reason} at {reached:.6g} s of {record.steps.wanted[-1]:.6g} s; reduce solver.step"
 
-    def simulation_settings(self, exu: Any, machine: Machine, steps: Steps) -> Any:
+    def simulation_settings(self, exu: Any, machine: ExudynSystem, steps: Steps) -> Any:
         """Return Exudyn's settings: fixed steps, no files."""
         settings = exu.SimulationSettings()
         settings.solution.file.write = False
@@ -207,7 +209,7 @@ class ExudynEngine(OneByOne):
         of_kind(INTEGRATORS, name, "integrator")
         return name
 
-    def _method(self, machine: Machine) -> tuple[str, float]:
+    def _method(self, machine: ExudynSystem) -> tuple[str, float]:
         """The integrator of a machine, and its spectral radius.
 
         Dependent constraints agree with each other on the positions only: on the velocities, drift parts them.
@@ -217,7 +219,7 @@ class ExudynEngine(OneByOne):
             return "generalized-alpha", REDUNDANT
         return name, radius if name == "generalized-alpha" else 1.0
 
-    def _model(self, exu: Any, machine: Machine, steps: Steps) -> dict[str, Any]:
+    def _model(self, exu: Any, machine: ExudynSystem, steps: Steps) -> dict[str, Any]:
         integrator, radius = self._method(machine)
         rods = machine.scene.flexible_rods.values()
         return {
@@ -235,7 +237,7 @@ class ExudynEngine(OneByOne):
         }
 
 
-def _force_tolerance(machine: Machine) -> float:
+def _force_tolerance(machine: ExudynSystem) -> float:
     """Unbalanced generalised force at which Newton's iteration ends [N].
 
     A smaller one than the round-off of the forces that balance each other is never reached: of weights, and of
@@ -251,10 +253,10 @@ def _force_tolerance(machine: Machine) -> float:
         forces.append(float(np.max(stiffness)) * extent)
     forces += [load.stiffness * extent for load in scene.loads.values() if isinstance(load, Spring)]
     forces += [load.stiffness * np.pi for load in scene.loads.values() if isinstance(load, TorsionSpring)]
-    return max(float(scene.solver.newton_tolerance), ROUND_OFF * max(forces, default=0.0))
+    return max(float(scene.solver.newton_tolerance), FORCE_FLOOR * max(forces, default=0.0))
 
 
-def _too_far(machine: Machine, record: Record) -> float:
+def _too_far(machine: ExudynSystem, record: KeptStates) -> float:
     """Return by which factor the steps are too long for narrow parts of force laws."""
     kept = record.steps.kept
     one_step = (np.diff(kept) == 1) & np.isfinite(record.q[1:]).all(axis=1)

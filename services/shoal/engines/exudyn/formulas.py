@@ -1,4 +1,4 @@
-"""Functions of time as Python text, and their derivatives."""
+"""Functions of time as Python expressions, and their symbolic derivatives by the chain rule."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from shoal.scene.formula import Node, make
 
 _PLAIN = 5
 _SIGNS = {"+": (1, 1, 2), "-": (1, 1, 2), "*": (2, 2, 3), "/": (2, 2, 3), "**": (4, 5, 3)}
-"""How tightly a sign binds, and what its sides must at least."""
+"""Precedence of an operator, and the least precedence of its left and right operand without brackets."""
 _NAMES = {"min": "np.minimum", "max": "np.maximum", "ramp": "ramp", "rise": "ramp"}
 
 
 def text(node: Node, variable: str = "t") -> str:
-    """A tree as an expression of Python with numpy, and `ramp` of `timed`."""
+    """Return a tree as an expression of Python with numpy, and `ramp` of `timed`."""
     return _text(node, variable)[0]
 
 
@@ -42,7 +42,7 @@ def _closed(part: tuple[str, int], least: int) -> str:
 
 
 def slope(node: Node) -> Node:
-    """The derivative of a smooth tree by t."""
+    """Return the derivative of a smooth tree by t."""
     if not isinstance(node, tuple):
         return 1.0 if node == "t" else 0.0
     operation, *arguments = node
@@ -77,4 +77,4 @@ _SLOPES: dict[str, Callable[..., Node]] = {
     "log": _chain(lambda u: make("/", 1.0, u)),
     "rise": _chain(lambda u: make("*", 30.0, make("**", make("*", u, make("-", 1.0, u)), 2.0))),
 }
-"""Of what is left where steps, kinks and their kin are cut."""
+"""Derivatives of the operations in a tree between its breakpoints, of their arguments."""

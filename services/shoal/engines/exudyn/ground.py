@@ -7,9 +7,9 @@ from typing import Any, Self
 
 import numpy as np
 
-from shoal.engines.course import Course
+from shoal.engines.course import PiecewiseFunction
 from shoal.engines.exudyn import user
-from shoal.engines.exudyn.bodies import Holder, Motion, Place, RigidPart, System
+from shoal.engines.exudyn.bodies import Holder, Place, PointMotion, RigidPart, System
 from shoal.engines.poses import InitialPose
 from shoal.errors import InputError
 from shoal.scene import Function, MovingPoint, PointMass
@@ -39,10 +39,10 @@ class GroundPart(Holder):
         """See Holder."""
         return system.turned(self.body, place, angle)
 
-    def motion(self, q: Array, v: Array, place: Place) -> Motion:
+    def motion(self, q: Array, v: Array, place: Place) -> PointMotion:
         """See Holder."""
         still = np.zeros(len(q))
-        return Motion(np.tile(place, (len(q), 1)).astype(float), np.zeros((len(q), 2)), still, still)
+        return PointMotion(np.tile(place, (len(q), 1)).astype(float), np.zeros((len(q), 2)), still, still)
 
 
 def add_moving_point(system: System, ground: GroundPart, name: str, path: MovingPoint, pose: InitialPose) -> RigidPart:
@@ -54,7 +54,7 @@ def add_moving_point(system: System, ground: GroundPart, name: str, path: Moving
     return part
 
 
-def driven(system: System, f: Function, field: str) -> Course:
+def driven(system: System, f: Function, field: str) -> PiecewiseFunction:
     """A prescribed position. Raises InputError where its rate jumps: Exudyn knows no impact there."""
     course = system.course(f, field, held=True)
     if jumps := course.jumps():
@@ -72,7 +72,7 @@ def _markers(system: System, *coordinates: Coordinate) -> list[Any]:
     return [system.add("MarkerNodeCoordinate", nodeNumber=node, coordinate=number) for node, number in coordinates]
 
 
-def drive(system: System, first: Coordinate, second: Coordinate, course: Course) -> None:
+def drive(system: System, first: Coordinate, second: Coordinate, course: PiecewiseFunction) -> None:
     """Let second - first follow a function of time; Exudyn counts coordinates from the start."""
     markers = _markers(system, first, second)
     system.add(

@@ -8,39 +8,39 @@ from typing import Any
 import numpy as np
 
 from shoal.engines.capabilities import of_kind
-from shoal.engines.course import Course
+from shoal.engines.course import PiecewiseFunction
 from shoal.engines.exudyn import user
 from shoal.engines.exudyn.beam import BeamPart
 from shoal.engines.exudyn.bodies import System
 from shoal.engines.exudyn.cable import CablePart
 from shoal.engines.exudyn.chain import gauss
-from shoal.engines.exudyn.connectors import Exchange, Law, add_spring, add_torsion
-from shoal.engines.exudyn.ends import Ends
+from shoal.engines.exudyn.connectors import Exchange, ForceLaw, add_spring, add_torsion
+from shoal.engines.exudyn.ends import SystemAttachments
 from shoal.scene import DistributedForce, Force, Load, Rod, Spring, Torque, TorsionSpring
 from shoal.trajectory import Array
 
 
-def add_load(ends: Ends, name: str, load: Load) -> Exchange:
+def add_load(ends: SystemAttachments, name: str, load: Load) -> Exchange:
     """Enter a load. Raises InputError."""
     enter = of_kind(LOADS, load.kind, f"loads.{name}")
     ends.system.enter(f"loads.{name}")
     return enter(ends, f"loads.{name}", load)
 
 
-def _add_spring(ends: Ends, where: str, load: Spring) -> Exchange:
+def _add_spring(ends: SystemAttachments, where: str, load: Spring) -> Exchange:
     return add_spring(ends, load.first, load.second, _law(load), load.length)
 
 
-def _add_torsion(ends: Ends, where: str, load: TorsionSpring) -> Exchange:
+def _add_torsion(ends: SystemAttachments, where: str, load: TorsionSpring) -> Exchange:
     ends.require_direction(where, load.first, load.second)
     return add_torsion(ends, load.first, load.second, _law(load), load.angle)
 
 
-def _law(load: Spring | TorsionSpring) -> Law:
-    return Law(load.stiffness, load.cubic, load.damping, elastic=load.elastic)
+def _law(load: Spring | TorsionSpring) -> ForceLaw:
+    return ForceLaw(load.stiffness, load.cubic, load.damping, elastic=load.elastic)
 
 
-def _add_force(ends: Ends, where: str, load: Force) -> Exchange:
+def _add_force(ends: SystemAttachments, where: str, load: Force) -> Exchange:
     scale = ends.system.course(load.scale, f"{where}.scale")
     marker = ends.turn(load.at) if load.follows else ends.hold(load.at)
     options = scaled(ends.system, [*load.force, 0.0], scale)
@@ -56,7 +56,7 @@ def _add_force(ends: Ends, where: str, load: Force) -> Exchange:
     return Exchange(power)
 
 
-def _add_torque(ends: Ends, where: str, load: Torque) -> Exchange:
+def _add_torque(ends: SystemAttachments, where: str, load: Torque) -> Exchange:
     ends.require_direction(where, load.at)
     torque = ends.system.course(load.torque, f"{where}.torque")
     for side, sign in ((load.at, 1.0), (load.reaction, -1.0)):
@@ -71,7 +71,7 @@ def _add_torque(ends: Ends, where: str, load: Torque) -> Exchange:
     return Exchange(power)
 
 
-def _add_distributed(ends: Ends, where: str, load: DistributedForce) -> Exchange:
+def _add_distributed(ends: SystemAttachments, where: str, load: DistributedForce) -> Exchange:
     scale = ends.system.course(load.scale, f"{where}.scale")
     part, rod, system = ends.parts[load.body], ends.scene.bodies[load.body], ends.system
     assert isinstance(rod, Rod)
@@ -98,7 +98,7 @@ def _add_distributed(ends: Ends, where: str, load: DistributedForce) -> Exchange
     return Exchange(power)
 
 
-def scaled(system: System, vector: list[float], scale: Course) -> dict[str, Any]:
+def scaled(system: System, vector: list[float], scale: PiecewiseFunction) -> dict[str, Any]:
     """A load vector times a function of time, as Exudyn's options."""
     if scale.function.number is not None:
         return {"loadVector": [scale.function.number * part for part in vector]}
@@ -106,7 +106,7 @@ def scaled(system: System, vector: list[float], scale: Course) -> dict[str, Any]
     return {"loadVector": vector, "loadVectorUserFunction": system.function(user.scaled_load, vector, scale.value)}
 
 
-LOADS: dict[str, Callable[[Ends, str, Any], Exchange]] = {
+LOADS: dict[str, Callable[[SystemAttachments, str, Any], Exchange]] = {
     "spring": _add_spring,
     "torsion-spring": _add_torsion,
     "force": _add_force,

@@ -85,7 +85,7 @@ def _multiples(times: Array, interval: float) -> bool:
 
 
 @dataclass
-class Record:
+class KeptStates:
     """Coordinates and velocities at the kept steps, (kept, unknowns); not a number where the run did not get."""
 
     steps: Steps

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from shoal.engines.course import Course
+from shoal.engines.course import PiecewiseFunction
 from shoal.engines.exudyn import formulas
 from shoal.engines.exudyn.bodies import System
 from shoal.scene import Function
@@ -22,7 +22,7 @@ Key = tuple[str, int]
 
 
 @dataclass
-class Entry:
+class RecordedItem:
     """One item: what it is of (a field of the scene), its class, its options and its number."""
 
     where: str
@@ -42,9 +42,9 @@ class Entry:
 class Recorder(System):
     """A system that remembers what is entered, and the functions that Exudyn calls."""
 
-    entries: list[Entry] = field(default_factory=list)
+    entries: list[RecordedItem] = field(default_factory=list)
     where: str = ""
-    fields: dict[int, tuple[Course, str]] = field(default_factory=dict)
+    fields: dict[int, tuple[PiecewiseFunction, str]] = field(default_factory=dict)
     made: dict[int, tuple[Any, Callable[..., Any], tuple[Any, ...]]] = field(default_factory=dict)
 
     def enter(self, what: str) -> None:
@@ -54,7 +54,7 @@ class Recorder(System):
     def add(self, kind: str, **options: Any) -> Any:
         """See System."""
         number = super().add(kind, **options)
-        self.entries.append(Entry(self.where, kind, options, key_of(number)))
+        self.entries.append(RecordedItem(self.where, kind, options, key_of(number)))
         return number
 
     def function(self, make: Callable[..., Any], *given: Any) -> Any:
@@ -63,7 +63,7 @@ class Recorder(System):
         self.made[id(found)] = found, make, given
         return found
 
-    def course(self, f: Function, field: str, *, held: bool = False) -> Course:
+    def course(self, f: Function, field: str, *, held: bool = False) -> PiecewiseFunction:
         """See System."""
         course = super().course(f, field, held=held)
         self.fields[id(course)] = course, field
@@ -126,7 +126,7 @@ class Texts:
         if isinstance(value, Function):
             return self._law(value)
         course = value.__self__
-        assert isinstance(course, Course)
+        assert isinstance(course, PiecewiseFunction)
         return self._of_time(course, value.__name__)
 
     def _law(self, law: Function) -> str:
@@ -135,7 +135,7 @@ class Texts:
             return f"lambda x: {formulas.text(law.formula, 'x')}"
         return f"polynomials({{'until': np.inf}}, {self._table(law)})"
 
-    def _of_time(self, course: Course, which: str) -> str:
+    def _of_time(self, course: PiecewiseFunction, which: str) -> str:
         """The variable that holds a function of time or its slope, which is defined with the first use."""
         where = self.recorder.fields[id(course)][1]
         key = hash((id(course), which))
@@ -148,7 +148,7 @@ class Texts:
             self.functions[name] = [f"# {where}: {_said(course)}", f"{name} = {self._definition(course, which)}"]
         return self.names[key]
 
-    def _definition(self, course: Course, which: str) -> str:
+    def _definition(self, course: PiecewiseFunction, which: str) -> str:
         if course.pieces is None:
             more = ", derivative=True" if which == "slope" else ""
             return f"polynomials(clock, {self._table(course.function)}{more})"
@@ -171,7 +171,7 @@ class Texts:
         return f"{self.of(times.tolist())}, {self.of(coefficients.tolist())}"
 
 
-def _said(course: Course) -> str:
+def _said(course: PiecewiseFunction) -> str:
     f = course.function
     if f.table is not None:
         return f"{'a spline' if f.smooth else 'straight lines'} through {len(f.table)} rows"

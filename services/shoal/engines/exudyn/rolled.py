@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from shoal.engines.exudyn.recorder import Entry, Key, Texts, identifier, is_number_of_item, key_of
+from shoal.engines.exudyn.recorder import Key, RecordedItem, Texts, identifier, is_number_of_item, key_of
 
 LONGEST = 8
 """Items that one turn of a loop enters at most."""
@@ -15,19 +15,19 @@ LEAST = 3
 
 
 @dataclass(frozen=True)
-class Block:
+class RepeatedEntries:
     """Entries of a loop: turns of `period` entries each; one turn is no loop."""
 
-    entries: list[Entry]
+    entries: list[RecordedItem]
     period: int
 
     @property
-    def turns(self) -> list[list[Entry]]:
+    def turns(self) -> list[list[RecordedItem]]:
         """The entries, turn by turn."""
         return [self.entries[k : k + self.period] for k in range(0, len(self.entries), self.period)]
 
 
-def blocks(entries: list[Entry]) -> Iterator[Block]:
+def blocks(entries: list[RecordedItem]) -> Iterator[RepeatedEntries]:
     """Entries of one field of a scene, in loops where they repeat."""
     shapes = [(entry.kind, *entry.options) for entry in entries]
     begin = 0
@@ -38,7 +38,7 @@ def blocks(entries: list[Entry]) -> Iterator[Block]:
         )
         if count < LEAST:
             period, count = 1, 1
-        yield Block(entries[begin : begin + period * count], period)
+        yield RepeatedEntries(entries[begin : begin + period * count], period)
         begin += period * count
 
 
@@ -52,7 +52,7 @@ def _turns(shapes: list[Any], begin: int, period: int) -> int:
 class Statements:
     """The text of entries; where an item has a name, others call it by that."""
 
-    def __init__(self, texts: Texts, entries: list[Entry]) -> None:
+    def __init__(self, texts: Texts, entries: list[RecordedItem]) -> None:
         self.texts = texts
         self.asked = {key for entry in entries for key in _keys(list(entry.options.values()))}
         self.kinds: set[str] = set()
@@ -67,7 +67,7 @@ class Statements:
             return f"{name}[{row}]"
         return self._names[key]
 
-    def of(self, block: Block) -> Iterator[str]:
+    def of(self, block: RepeatedEntries) -> Iterator[str]:
         """The lines of a block."""
         turns = block.turns
         self.kinds |= {entry.kind for entry in turns[0]}
@@ -81,7 +81,7 @@ class Statements:
             return
         yield from self._loop(turns)
 
-    def _loop(self, turns: list[list[Entry]]) -> Iterator[str]:
+    def _loop(self, turns: list[list[RecordedItem]]) -> Iterator[str]:
         calls, columns, lists = [], dict[str, list[str]](), []
         shared: dict[Key, tuple[str, int]] = {}
         for place, one in enumerate(turns[0]):
@@ -138,14 +138,14 @@ class Statements:
     def _text(self, value: Any) -> str:
         return self.texts.of(value, self.name_of)
 
-    def _call(self, entry: Entry, options: dict[str, str]) -> str:
+    def _call(self, entry: RecordedItem, options: dict[str, str]) -> str:
         inner = ", ".join(f"{name}={text}" for name, text in options.items())
         return f"mbs.Add{entry.family}({entry.kind}({inner}))"
 
-    def _wanted(self, entries: list[Entry]) -> bool:
+    def _wanted(self, entries: list[RecordedItem]) -> bool:
         return any(entry.key in self.asked for entry in entries)
 
-    def _new(self, entry: Entry) -> str:
+    def _new(self, entry: RecordedItem) -> str:
         stem = identifier("_".join([*entry.where.split(".")[-1:], entry.family.lower()]))
         name, number = stem, 2
         while name in self._taken:

@@ -14,7 +14,7 @@ import numpy as np
 from shoal.engines.capabilities import require
 from shoal.engines.contract import sampling_times
 from shoal.engines.exudyn import timed, user
-from shoal.engines.exudyn.build import Machine, library
+from shoal.engines.exudyn.build import ExudynSystem, library
 from shoal.engines.exudyn.engine import ExudynEngine
 from shoal.engines.exudyn.record import Steps, choose_steps
 from shoal.engines.exudyn.recorder import Recorder, Texts, is_number_of_item, key_of, source
@@ -54,7 +54,7 @@ def _written(scene: Scene) -> str:
 class _Script:
     """The parts of a script."""
 
-    def __init__(self, engine: ExudynEngine, exu: Any, machine: Machine, wanted: Any) -> None:
+    def __init__(self, engine: ExudynEngine, exu: Any, machine: ExudynSystem, wanted: Any) -> None:
         self.exu, self.scene, self.machine = exu, machine.scene, machine
         system = machine.system
         assert isinstance(system, Recorder)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from shoal.engines.tree.scene import Begin
+from shoal.engines.tree.scene import BodyStart
 from shoal.scene import GROUND, Attachment, Distance, PointMass, Revolute, Scene, Slider, Spherical, Weld
 from shoal.scene.dimensions import padded
 from shoal.scene.joints import Cylindrical, Planar, Universal
@@ -19,7 +19,7 @@ Freedom = tuple[str, Array]
 
 
 @dataclass
-class Link:
+class TreeLink:
     """A body, what it hangs on, and how: by a joint of the scene from a place of the parent, or free."""
 
     name: str
@@ -30,16 +30,16 @@ class Link:
     """Of the joint at the start [m]."""
 
 
-class Tree:
+class LinkTree:
     """The links of a scene at its start.
 
     begin: how each body begins; axis: of a joint at one of its places, from there and what the scene states of it
     """
 
-    def __init__(self, scene: Scene, begin: Mapping[str, Begin], axis: Callable[..., Array]) -> None:
+    def __init__(self, scene: Scene, begin: Mapping[str, BodyStart], axis: Callable[..., Array]) -> None:
         self._scene, self._begin, self._axis = scene, begin, axis
 
-    def links(self) -> Iterator[Link]:
+    def links(self) -> Iterator[TreeLink]:
         """Bodies from the ground outwards; what MuJoCo's constraints can close as well is cut first."""
         joints: dict[str, Any] = {name: joint for name, joint in self._scene.joints.items() if self._hangs(joint)}
         order = sorted(joints, key=lambda name: isinstance(joints[name], Revolute | Spherical | Weld))
@@ -75,23 +75,23 @@ class Tree:
         masses = any(side is None or isinstance(self._scene.bodies.get(side.body), PointMass) for side in sides)
         return not (masses or isinstance(joint, Distance))
 
-    def _free(self, body: str) -> Link:
+    def _free(self, body: str) -> TreeLink:
         begin, flat = self._begin[body], self._scene.dimensions == 2
         if isinstance(self._scene.bodies[body], PointMass):
-            return Link(body, GROUND, "", [("slide", axis) for axis in np.eye(3)[: 2 if flat else 3]], begin.origin)
+            return TreeLink(body, GROUND, "", [("slide", axis) for axis in np.eye(3)[: 2 if flat else 3]], begin.origin)
         if flat:
             freedoms = [("slide", np.eye(3)[0]), ("slide", np.eye(3)[1]), ("hinge", np.eye(3)[2])]
-            return Link(body, GROUND, "", freedoms, begin.origin)
-        return Link(body, GROUND, "", [("free", np.zeros(3))], begin.origin)
+            return TreeLink(body, GROUND, "", freedoms, begin.origin)
+        return TreeLink(body, GROUND, "", [("free", np.zeros(3))], begin.origin)
 
-    def _hang(self, name: str, parent: str, child: Attachment) -> Link:
+    def _hang(self, name: str, parent: str, child: Attachment) -> TreeLink:
         joint: Any = self._scene.joints[name]
         freedoms = list(self._freedoms(name, joint))
         if joint.first.body != parent:
             freedoms.reverse()
         # Where the second place slides on a line or a plane of the first body, turns are about the second one.
         turned = joint.second if isinstance(joint, Slider | Cylindrical | Planar) else child
-        return Link(child.body, parent, name, freedoms, where(self._scene, self._begin, turned))
+        return TreeLink(child.body, parent, name, freedoms, where(self._scene, self._begin, turned))
 
     def _freedoms(self, name: str, joint: Any) -> Iterator[Freedom]:
         """From the first body to the second."""
@@ -131,6 +131,6 @@ def local(scene: Scene, at: Attachment) -> Array:
     return np.array([float(x) for x in padded(place, 3)])
 
 
-def where(scene: Scene, begin: Mapping[str, Begin], at: Attachment) -> Array:
+def where(scene: Scene, begin: Mapping[str, BodyStart], at: Attachment) -> Array:
     """A place at the start [m], (3,)."""
     return begin[at.body].point(local(scene, at))

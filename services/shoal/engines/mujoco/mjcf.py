@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from shoal.engines.capabilities import check_acceleration
-from shoal.engines.mujoco.links import Freedom, Link, Tree, local, where
+from shoal.engines.mujoco.links import Freedom, LinkTree, TreeLink, local, where
 from shoal.engines.mujoco.refused import require_counterparts
 from shoal.engines.tree.scene import started
 from shoal.errors import InputError
@@ -61,7 +61,7 @@ class Mjcf:
         self.rates: list[float] = []
         self._sites: dict[str, list[tuple[str, Any]]] = {}
         self._springs: dict[str, list[tuple[float, float, float]]] = {}
-        links = list(Tree(scene, self._begin, self._axis).links())
+        links = list(LinkTree(scene, self._begin, self._axis).links())
         self._hung = {link.joint: link for link in links if link.joint}
         parts = self._tendons_and_actuators()
         for name, at in scene.markers.items():
@@ -92,7 +92,7 @@ class Mjcf:
         ElementTree.indent(root)
         self.text = ElementTree.tostring(root, encoding="unicode") + "\n"
 
-    def _grow(self, element: ElementTree.Element, body: str, links: list[Link]) -> None:
+    def _grow(self, element: ElementTree.Element, body: str, links: list[TreeLink]) -> None:
         """The sites of a body and the bodies that hang on it."""
         begin = self._begin[body]
         for name, place in self._sites.get(body, []):
@@ -130,7 +130,7 @@ class Mjcf:
         options = {"pos": _numbers(centre), "mass": repr(float(body.mass)), "diaginertia": _numbers(moments)}
         _under(element, "inertial", **options, quat=_quaternion(turn))
 
-    def _joint(self, element: ElementTree.Element, link: Link, number: int, freedom: Freedom) -> None:
+    def _joint(self, element: ElementTree.Element, link: TreeLink, number: int, freedom: Freedom) -> None:
         kind, axis = freedom
         own, parent = self._begin[link.name], self._begin[link.parent]
         turning = own.spin - parent.spin
@@ -150,7 +150,7 @@ class Mjcf:
         speed = own.speed(link.place) - parent.speed(link.place)
         self.rates += {"slide": [speed @ axis], "hinge": [turning @ axis], "ball": [*(own.axes.T @ turning)]}[kind]
 
-    def _forces(self, link: Link, joint: Any) -> dict[str, str]:
+    def _forces(self, link: TreeLink, joint: Any) -> dict[str, str]:
         """Friction of a joint, and the torsion springs that act in it."""
         springs = self._springs.get(link.joint, [])
         stiffness = sum(spring[0] for spring in springs)

@@ -1,4 +1,4 @@
-"""Features of scenes that MuJoCo's format lacks."""
+"""Features of scenes that MuJoCo's format MJCF has no counterpart of."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from shoal.scene import (
 
 JOINTS = (Revolute, Spherical, Universal, Slider, Cylindrical, Planar, Weld, Distance)
 LOADS = (Spring, TorsionSpring, Force, Torque)
-"""What is written as MJCF."""
+"""Kinds that have a counterpart in MJCF."""
 
 
 def require_counterparts(scene: Scene) -> None:
-    """Raises InputError that names what of a scene MJCF has not, as far as that shows before its tree is built."""
+    """Raises InputError that names a feature of a scene without a counterpart, of those seen without its tree."""
     for name, body in scene.bodies.items():
         if name == "world":
             raise InputError("bodies.world: MJCF calls the ground so; give the body another name")

@@ -1,9 +1,9 @@
-"""Accelerations at linear cost: Gauss's principle solved body by body, from the tips to the ground and back.
+"""Articulated-body algorithm: accelerations of a tree at linear cost, from the tips to the ground and back.
 
 On minimal coordinates nothing is constrained, and the minimiser of Gauss's function is qddot = M^-1 (F - C qdot).
 The sum over the bodies need not be assembled for that: given the acceleration of its parent, the joint of a
 tip minimises its own share, and what remains is again a quadratic function of the parent's acceleration. Its
-matrix is the articulated inertia. This is the method of Popov and Vereshchagin (1974), found again as the
+matrix is the articulated inertia. This is the method of Popov and Vereshchagin (1974), known as the
 articulated-body algorithm (Featherstone, Rigid Body Dynamics Algorithms, 2008, section 7.3), here in
 [omega; v] of each body's own origin and in the axes of the fixed frame, so that going from a body to its
 parent shifts an inertia but does not rotate it.

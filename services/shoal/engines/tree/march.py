@@ -23,7 +23,7 @@ SMALLEST_STEP = 1e-13
 """Smallest controlled step relative to the time of the run."""
 
 
-class Marched(NamedTuple):
+class TreeRun(NamedTuple):
     """Record of a run.
 
     states: y at the times, (times, coordinates + rates + 1); rotation, position: of the bodies, (times, bodies, 9 or 3)
@@ -99,10 +99,10 @@ def first_step(y: Array, slope: Array, tolerance: float) -> float:
 
 
 @njit(**OPTIONS)
-def march(tree: Tree, w: Room, method: Tableau, y: Array, times: Array, step: float, tolerance: float) -> Marched:
+def march(tree: Tree, w: Room, method: Tableau, y: Array, times: Array, step: float, tolerance: float) -> TreeRun:
     """March y from time zero over `times` [s], increasing, with steps of at most `step`, or to the tolerance."""
     samples = len(times)
-    record = Marched(
+    record = TreeRun(
         np.full((samples, y.size), np.nan),
         np.full((samples, *w.rotation.shape), np.nan),
         np.full((samples, *w.position.shape), np.nan),

@@ -21,16 +21,17 @@ from shoal.engines.tree.description import (
 )
 from shoal.errors import InputError
 from shoal.mechanics.assembly.masses import second_moments
-from shoal.mechanics.assembly.space.start import begun, place_started
+from shoal.mechanics.assembly.space.start import place_started
 from shoal.mechanics.numerics.tile import stacked
 from shoal.mechanics.reach import span
+from shoal.mechanics.start.start import begun
 from shoal.scene import GROUND, Attachment, Force, InitialState, PointMass, Revolute, Scene, Slider, Spherical, Torque
 from shoal.scene.dimensions import padded
 from shoal.trajectory import Array
 
 
 @dataclass(frozen=True)
-class Begin:
+class BodyStart:
     """Origin [m], axes as columns, velocity [m/s] and spin [rad/s] of a body at the start, (3,), (3, 3), (3,), (3,)."""
 
     origin: Array
@@ -138,16 +139,16 @@ def _body(body: Any, size: float) -> SpatialBody:
     )
 
 
-def started(scene: Scene) -> tuple[dict[str, Begin], Any, dict[str, InitialState]]:
+def started(scene: Scene) -> tuple[dict[str, BodyStart], Any, dict[str, InitialState]]:
     """Return the start of every body, and a function for the direction of a stated joint axis at the start."""
-    still = Begin(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
+    still = BodyStart(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
     found = {GROUND: still}
     if scene.dimensions == 2:
         initial = {}
         for name, pose in initial_poses(scene).items():
             axes = Rotation.from_rotvec([0.0, 0.0, pose.angle]).as_matrix()
             origin, velocity = np.array([*pose.origin, 0.0]), np.array([*pose.velocity, 0.0])
-            found[name] = Begin(origin, axes, velocity, np.array([0.0, 0.0, pose.rate]))
+            found[name] = BodyStart(origin, axes, velocity, np.array([0.0, 0.0, pose.rate]))
             if name != GROUND:
                 initial[name] = InitialState(
                     angle=pose.angle, rate=pose.rate, position=tuple(pose.origin), velocity=tuple(pose.velocity)
@@ -155,12 +156,12 @@ def started(scene: Scene) -> tuple[dict[str, Begin], Any, dict[str, InitialState
         return found, lambda side, axis: np.array([0.0, 0.0, 1.0]), initial
     placement = place_started(scene)
     q, v = stacked(placement.positions)[:, 0], stacked(placement.velocities)[:, 0]
-    initial = begun(placement.frames, q, v)
+    initial = begun(placement.frames, scene, q, v)
     for name, begin in initial.items():
         axes = Rotation.from_rotvec(begin.rotation or (0.0, 0.0, 0.0)).as_matrix()
         parts = (np.array(part, dtype=float) for part in (begin.position, begin.velocity, begin.spin or (0, 0, 0)))
         origin, velocity, spin = parts
-        found[name] = Begin(origin, axes, velocity, spin)
+        found[name] = BodyStart(origin, axes, velocity, spin)
 
     def pointing(side: Attachment, axis: Any) -> Array:
         return np.asarray(found[side.body].axes @ placement.attitudes.image(side.body, axis)[:, 0])

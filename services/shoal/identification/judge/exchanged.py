@@ -6,9 +6,13 @@ from itertools import combinations
 
 import numpy as np
 
+from shoal.findings import Finding
+from shoal.identification.findings import EXCHANGED
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods.starts import damped_steps, poses_and_slopes
 from shoal.identification.recording.source import Channel
+from shoal.mechanics.numerics.levenberg_marquardt import levenberg_marquardt
+from shoal.mechanics.numerics.tile import Index
 from shoal.trajectory import Array
 
 _SAMPLES = 10
@@ -16,10 +20,12 @@ _BETTER = 10.0
 _LIBRARY = 2048
 _NEAREST = 4
 _ITERATIONS = 12
+_GAIN = 1e-3
+"""A pose is found where a step promises to lower its squared error by less than this part."""
 
 
-def exchanged(model: ForwardModel) -> str | None:
-    """What to say where markers seem exchanged in a whole recording, which no continuity shows; else None.
+def exchanged(model: ForwardModel) -> Finding | None:
+    """Return what was found where markers seem exchanged in a whole recording, which no continuity shows; else None.
 
     Ten samples of each recording are compared with the poses that the model can take by its sought initial angles,
     the other parameters at their starts. Another assignment is named where it leaves a tenth of the deviation.
@@ -37,10 +43,9 @@ def exchanged(model: ForwardModel) -> str | None:
         if _BETTER * misfits[best] < misfits[0]:
             one, other = pairs[best - 1]
             where = f" in recording {name}" if len(model.measurement.recordings) > 1 else ""
-            return (
-                f"markers {one} and {other} seem exchanged{where}: the poses are off by {misfits[0]:.2g}, "
-                f"with both exchanged by {misfits[best]:.2g}"
-            )
+            text = f"markers {one} and {other} seem exchanged{where}: the poses are off by {misfits[0]:.2g}, "
+            text += f"with both exchanged by {misfits[best]:.2g}"
+            return EXCHANGED.found(text, before=float(misfits[0]), after=float(misfits[best]))
     return None
 
 
@@ -65,7 +70,7 @@ def _order(channels: tuple[Channel, ...], one: str, other: str) -> Array:
 def _pose_misfit(model: ForwardModel, name: str, angles: list[int], wanted: Array) -> Array:
     """Root mean square distance from the nearest pose, (assignments,), of wanted channels (assignments, samples, n).
 
-    From the nearest of many poses by Gauss-Newton steps, all samples at once.
+    From the nearest of many poses by the Levenberg-Marquardt method, all samples at once.
     """
     from scipy.stats import qmc  # slow to import
 
@@ -77,14 +82,20 @@ def _pose_misfit(model: ForwardModel, name: str, angles: list[int], wanted: Arra
     far = np.stack([np.sum(_difference(seen, target, kinds) ** 2, axis=1) for target in targets])
     points = library[np.argsort(far, axis=1)[:, :_NEAREST].ravel()]
     targets = np.repeat(targets, _NEAREST, axis=0)
-    misfit = np.sum(_difference(model.poses(points, name), targets, kinds) ** 2, axis=1)
-    for _ in range(_ITERATIONS):
-        trial = _gauss_newton(model, name, points, targets, angles, kinds)
-        found = np.sum(_difference(model.poses(trial, name), targets, kinds) ** 2, axis=1)
-        points = np.where((found < misfit)[:, None], trial, points)
-        misfit = np.minimum(misfit, found)
-    nearest = misfit.reshape(*wanted.shape[:2], _NEAREST).min(axis=2)
-    return np.asarray(np.sqrt(np.mean(nearest, axis=1)))
+
+    def evaluate(at: Array, numbers: Index) -> tuple[Array, Array]:
+        placed = points[numbers]
+        placed[:, angles] = at
+        seen, jacobian = poses_and_slopes(model, name, placed, angles)
+        jacobian[:, [not kind for kind in kinds]] = 0.0
+        return _difference(seen, targets[numbers], kinds), jacobian
+
+    found = levenberg_marquardt(
+        evaluate, damped_steps, points[:, angles], gain=_GAIN, most=_ITERATIONS,
+        move=lambda at, step: (at + step + np.pi) % (2 * np.pi) - np.pi,
+    )  # fmt: skip
+    nearest = found.norms.reshape(*wanted.shape[:2], _NEAREST).min(axis=2)
+    return np.asarray(np.sqrt(np.mean(nearest**2, axis=1)))
 
 
 def _difference(seen: Array, targets: Array, kinds: tuple[str, ...]) -> Array:
@@ -92,17 +103,3 @@ def _difference(seen: Array, targets: Array, kinds: tuple[str, ...]) -> Array:
     error = seen - targets
     error = np.where([kind == "angle" for kind in kinds], (error + np.pi) % (2 * np.pi) - np.pi, error)
     return np.where([not kind for kind in kinds], 0.0, error)
-
-
-def _gauss_newton(
-    model: ForwardModel, name: str, points: Array, targets: Array, angles: list[int], kinds: tuple[str, ...]
-) -> Array:
-    """The points with their angles moved towards the targets, (points, parameters)."""
-    seen, jacobian = poses_and_slopes(model, name, points, angles)
-    error = _difference(seen, targets, kinds)
-    jacobian[:, [not kind for kind in kinds]] = 0.0
-    # A little damping, so that a stretched pose (singular) does not send the angles far away.
-    step = damped_steps(error, jacobian, np.full(len(points), 1e-6))
-    moved = points.copy()
-    moved[:, angles] = (points[:, angles] - step + np.pi) % (2 * np.pi) - np.pi
-    return moved

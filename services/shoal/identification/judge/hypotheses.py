@@ -30,7 +30,7 @@ _MOST = 0.75
 """Of the mean square of a residual: a fit that lowers it by so much names what a misfit is mainly due to, although what
 remains is not noise."""
 
-_ROUND_OFF = 1e-9
+_ZERO = 1e-9
 """Of the largest eigenvalue of correlations: a smaller one counts as none."""
 
 
@@ -197,5 +197,5 @@ def table(test: ScoreTest, effects: Effects) -> tuple[list[Hypothesis], float]:
 def independent(units: Array) -> float:
     """How many independent tests those along unit effects (tests, rows) are worth (Li and Ji 2005)."""
     values = np.abs(np.linalg.eigvalsh(units @ units.T))
-    values = np.where(values < _ROUND_OFF * len(units), 0.0, values + _ROUND_OFF)
+    values = np.where(values < _ZERO * len(units), 0.0, values + _ZERO)
     return float(np.sum((values >= 1.0) + (values - np.floor(values))))

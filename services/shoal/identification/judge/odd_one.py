@@ -7,6 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from shoal.findings import Finding
+from shoal.identification.findings import ODD_RECORDING
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.suspects.of_data import misfit
 from shoal.identification.methods.lanes import descend_many
@@ -24,31 +26,32 @@ _LARGE = 3.0
 """Times a noise that is only estimated; and times the residual of the others, from where on a recording stands out."""
 
 
-def odd_one(model: ForwardModel, point: Array, residual: Array) -> tuple[str, str]:
-    """What to say, and to do, about recordings that contradict each other; both empty where there is one or none does.
+def odd_one(model: ForwardModel, point: Array, residual: Array) -> Finding | None:
+    """Return what was found about recordings that contradict each other; None where there is one or none does.
 
     point, residual (rows,): where all together were fitted. Raises TimeIsUp.
     """
     recordings = model.measurement.recordings
     if len(recordings) < 2:
-        return "", ""
+        return None
     rows, unit = model.rows, of_channels(model.measurement)
     sizes = {name: misfit(residual[: len(rows.time)][rows.recording == k]) for k, name in enumerate(recordings)}
     largest = sorted(sizes, key=lambda name: -sizes[name])
     found = {name: left for name in largest[:_MOST] if (left := _without(model, point, name)) is not None}
     if len(found) == len(recordings) == 2:
-        told = f"recordings {' and '.join(recordings)} fit alone, but not together"
-        return told, "check what is known of either recording, and whether they are of one machine"
+        text = f"recordings {' and '.join(recordings)} fit alone, but not together"
+        return ODD_RECORDING.found(text, "check what is known of either recording, and whether they are of one machine")
     if found:
         best = min(found, key=lambda name: found[name])
         size = f"{found[best]:.2g} {unit}".strip()
-        return f"without recording {best} the others fit, and leave {size}", f"check recording {best}"
+        text = f"without recording {best} the others fit, and leave {size}"
+        return ODD_RECORDING.found(text, f"check recording {best}", residual=found[best])
     worst, *others = largest
     usual = float(np.median([sizes[name] for name in others]))
     if sizes[worst] > _LARGE * usual:
-        told = f"the residual of recording {worst} is {sizes[worst]:.2g} {unit}, that of the others about {usual:.2g}"
-        return told, f"check recording {worst}"
-    return "", ""
+        text = f"the residual of recording {worst} is {sizes[worst]:.2g} {unit}, that of the others about {usual:.2g}"
+        return ODD_RECORDING.found(text, f"check recording {worst}", residual=sizes[worst], usual=usual)
+    return None
 
 
 def _without(model: ForwardModel, point: Array, name: str) -> float | None:

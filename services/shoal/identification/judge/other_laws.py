@@ -11,8 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from shoal.findings import Finding
+from shoal.identification.findings import OTHER_LAW
 from shoal.identification.forward import ForwardModel
-from shoal.identification.judge.suspects.candidate import Candidate
+from shoal.identification.judge.suspects.candidate import FaultHypothesis
 from shoal.identification.judge.suspects.fits import Together
 from shoal.identification.judge.suspects.of_machine import RESISTING, resisting
 from shoal.identification.judge.suspects.size import size_of
@@ -47,7 +49,7 @@ class OtherLaw:
 def other_laws(model: ForwardModel, point: Array, seen: Sensitivity) -> list[OtherLaw]:
     """Each friction that is sought, with each other law that its joint may have. Runs are not counted."""
     taken = {*model.parameters.paths, *model.problem.ties}
-    asked, beside = list[tuple[str, str, str]](), dict[tuple[str, str], Candidate]()
+    asked, beside = list[tuple[str, str, str]](), dict[tuple[str, str], FaultHypothesis]()
     for name, path in zip(model.names, model.parameters.paths, strict=True):
         where, _, field = path.rpartition(".")
         joint_name = where.removeprefix("joints.")
@@ -69,8 +71,10 @@ def other_laws(model: ForwardModel, point: Array, seen: Sensitivity) -> list[Oth
     return [OtherLaw(name, joint, law, *end) for name, joint, law in asked if (end := ends[joint, law]) is not None]
 
 
-def sentences(laws: list[OtherLaw], values: dict[str, Value], there: Callable[[OtherLaw], Value]) -> list[str]:
-    """One for each friction that is known much less well if its joint resists by another law too.
+def wider_by_other_laws(
+    laws: list[OtherLaw], values: dict[str, Value], there: Callable[[OtherLaw], Value]
+) -> list[Finding]:
+    """Return a finding for each friction that is known much less well if its joint resists by another law too.
 
     there: the sought friction at the end of a law
     """
@@ -80,11 +84,12 @@ def sentences(laws: list[OtherLaw], values: dict[str, Value], there: Callable[[O
         least = max(_FAR * (known.upper - known.lower) / 2, _ALIKE * abs(known.value))
         if known.identifiable and abs(other.value - known.value) > least:
             wide.setdefault((law.sought, law.joint), {})[RESISTING[law.field]] = other
-    return [
+    texts = [
         f"should {joint} have {' or '.join(others)} as well, which may not show here, {sought} is only known to be "
         "from {:.4g} to {:.4g}".format(*_whole([values[sought], *others.values()]))
         for (sought, joint), others in wide.items()
     ]
+    return [OTHER_LAW.found(text) for text in texts]
 
 
 def _whole(found: list[Value]) -> tuple[float, float]:

@@ -16,6 +16,7 @@ import numpy as np
 
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.rivals import turn_of_samples
+from shoal.mechanics.numerics.newton import newton
 from shoal.mechanics.rotation import of_vector, vector_of
 from shoal.scene import RigidBody, Scene
 from shoal.scene.dimensions import padded
@@ -57,7 +58,7 @@ def turned(model: ForwardModel, point: Array) -> Iterator[Array]:
     if turn is None:
         return
     for name in model.measurement.recordings:
-        start = _Start(model, point, name)
+        start = _ReachableStart(model, point, name)
         # What turns together, and about which axis.
         together = tuple(start.turning)
         axes = [(body, axis) for body in together for axis in start.axes(body)]
@@ -71,7 +72,7 @@ def turned(model: ForwardModel, point: Array) -> Iterator[Array]:
 
 def mirrored(model: ForwardModel, point: Array, name: str) -> Iterator[Array]:
     """Mirror images of a machine in space, and half turns of it, in a recording, within the bounds."""
-    start = _Start(model, point, name)
+    start = _ReachableStart(model, point, name)
     if start.scene.dimensions != 3:
         return
     bodies = [body for body in start.scene.initial if start.sought_of(body)]
@@ -91,7 +92,7 @@ def mirrored(model: ForwardModel, point: Array, name: str) -> Iterator[Array]:
 
 
 @dataclass(frozen=True)
-class _Start:
+class _ReachableStart:
     """The start of a machine in a recording at a point (parameters,)."""
 
     model: ForwardModel
@@ -199,19 +200,27 @@ class _Start:
         """The point (parameters,) whose start has these numbers; None where there is none."""
         parameters, paths = self.model.parameters, list(wanted)
         target = np.array([wanted[path] for path in paths])
-        values = parameters.to_values(self.point)
-        for _ in range(_STEPS if paths else 0):
-            off = target - self._made(values[None], paths)[0]
-            if np.all(np.abs(off) <= _OFF * (1.0 + np.abs(target))):
-                return parameters.to_vector(values)
-            if not np.all(np.isfinite(off)):
-                break
+
+        def left(values: Array) -> Array:
+            return np.asarray(target - self._made(values[None], paths)[0])
+
+        def met(off: Array) -> bool:
+            return bool(np.all(np.abs(off) <= _OFF * (1.0 + np.abs(target))))
+
+        def correct(values: Array) -> tuple[Array, float]:
+            if met(off := left(values)):
+                return np.zeros_like(values), 0.0
             # In place of derivatives, which ties have none of: differences, exact where they are linear.
             steps = 1e-3 * (1.0 + np.abs(values))
             slope = (self._made(values + np.diag(steps), paths) - self._made(values[None], paths)).T / steps
             slope = np.where(self._free & np.isfinite(slope), slope, 0.0)
-            values = values + np.linalg.lstsq(slope, off)[0]
-        return None
+            move = np.asarray(np.linalg.lstsq(slope, off)[0], dtype=float)
+            return move, float(np.max(np.abs(move) / steps))
+
+        if not paths:
+            return None
+        values = newton(correct, parameters.to_values(self.point), close=0.0, most=_STEPS).point
+        return parameters.to_vector(values) if met(left(values)) else None
 
     @cached_property
     def _free(self) -> Array:

@@ -26,7 +26,7 @@ _NO_FIT = 0.05
 """Of the signal: a systematic residual above this is a wrong model, one below it an imperfect one."""
 _HARDLY = 0.3
 """Of the signal: a residual above this that is not white is none of a right model, whatever the noise may be."""
-_ROUND_OFF = 1e-9
+_TABLE_DIGITS = 1e-9
 """Of the signal: digits of a table, and no noise."""
 _MOSTLY = 0.5
 """Of the signal: a residual above this may be noise, but nobody said so."""
@@ -163,7 +163,7 @@ class ResidualTests:
     @property
     def correlation(self) -> str:
         """What the residuals' correlation shows, in words."""
-        if self.size < _ROUND_OFF * self.signal:
+        if self.size < _TABLE_DIGITS * self.signal:
             return "that of round-off"
         if not self.white:
             return "not white noise"

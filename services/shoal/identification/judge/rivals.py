@@ -14,6 +14,8 @@ from shoal.identification.methods.outcome import Outcome
 from shoal.identification.spread.chances import chi_square_above
 from shoal.identification.spread.uncertainty import LEVEL, Linearisation
 from shoal.identification.spread.value import Value
+from shoal.mechanics.numerics.levenberg_marquardt import levenberg_marquardt
+from shoal.mechanics.numerics.tile import Index
 from shoal.trajectory import Array
 
 ALIAS = "the same at every sample, and apart between samples"
@@ -89,22 +91,17 @@ def _way(model: ForwardModel, one: Array, other: Array) -> Array:
 
 def _descended(model: ForwardModel, points: Array, across: Array, limit: float) -> tuple[Array, Array]:
     """Points (points, parameters) after a few steps along the columns of `across`, and their fitness, (points,)."""
-    points = np.clip(points, model.lower, model.upper)
-    residuals, jacobians = differentiate_many(model, points)
-    values, damping = model.cost(residuals), np.full(len(points), 1e-3)
-    for _ in range(_STEPS):
-        above = np.flatnonzero(~(values <= limit))
-        if not above.size:
-            break
-        steps = [_downhill(residuals[k], jacobians[k] @ across, damping[k]) for k in above]
-        trials = np.clip(points[above] + np.array(steps) @ across.T, model.lower, model.upper)
-        found, slopes = differentiate_many(model, trials)
-        lower = model.cost(found) < values[above]
-        damping[above] *= np.where(lower, 0.1, 10.0)
-        kept = above[lower]
-        points[kept], residuals[kept], jacobians[kept] = trials[lower], found[lower], slopes[lower]
-        values[kept] = model.cost(found[lower])
-    return points, values
+
+    def solve(residuals: Array, jacobians: Array, damping: Array, _: Index) -> Array:
+        searches = zip(residuals, jacobians @ across, damping, strict=True)
+        return np.array([_downhill(*one) for one in searches]).reshape(len(residuals), across.shape[1]) @ across.T
+
+    found = levenberg_marquardt(
+        lambda points, _: differentiate_many(model, points), solve, np.clip(points, model.lower, model.upper),
+        gain=0.0, close=float(np.sqrt(limit * model.rows.samples)), most=_STEPS,
+        move=lambda points, step: np.clip(points + step, model.lower, model.upper),
+    )  # fmt: skip
+    return found.points, model.cost(found.residuals)
 
 
 def _downhill(residual: Array, jacobian: Array, damping: float) -> Array:

@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from shoal.findings import Finding
+from shoal.identification.findings import ODD_STRETCH
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.suspects.of_data import misfit
 from shoal.identification.methods.lanes import descend_many
@@ -29,7 +31,7 @@ _LOUD, _LARGE = 1.5, 3.0
 
 
 @dataclass(frozen=True)
-class _Stretch:
+class _SampleRange:
     """Samples from first to last of channels (by number) of a recording, of one place."""
 
     recording: str
@@ -45,35 +47,36 @@ class _Stretch:
         return f"{self.place}{of} from {begin:.4g} s to {end:.4g} s"
 
 
-def odd_stretch(model: ForwardModel, point: Array) -> tuple[str, str]:
-    """What to say, and to do, about stretches without which the rest fits; both empty where there are none.
+def odd_stretch(model: ForwardModel, point: Array) -> Finding | None:
+    """Return what was found about stretches without which the rest fits; None where there are none.
 
     point: where all was fitted. Runs are not counted. Raises TimeIsUp.
     """
     robust = model.aside(problem=model.problem.model_copy(update={"loss": "cauchy"}))
     if not np.all(robust.loss_scale**2 > 0.0):  # without noise nothing is usual
-        return "", ""
+        return None
     starts = np.vstack([point, starting_points(model)[:_STARTS]])
     best = min(descend_many(robust, starts, patience=_PATIENCE), key=lambda end: end.fitness)
     plain = model.aside(problem=model.problem.model_copy(update={"loss": "squares"}))
     residual = plain.uncounted(best.point[None])[0, : len(model.rows.time)]
     if not np.all(np.isfinite(residual)):
-        return "", ""
+        return None
     found = list(_stretches(model, residual))
     if not 0 < len(found) <= _STRETCHES:
-        return "", ""
+        return None
     rest = _without(plain, found)
     left = misfit(min(descend_many(rest, best.point[None]), key=lambda end: end.fitness).residual)
     stated = rest.rows.noise
     noise = float(np.sqrt(np.mean((rest.rows.estimated * rest.rows.weight) ** 2))) if stated is None else stated
     if left > (_LARGE if stated is None else _LOUD) * noise:
-        return "", ""
+        return None
     names = " and ".join(one.told(model) for one in found)
     size = f"{left:.2g} {of_channels(model.measurement)}".strip()
-    return f"without {names} the rest fits, and leaves {size}", f"check {names}: cells of a lost marker are left empty"
+    step = f"check {names}: cells of a lost marker are left empty"
+    return ODD_STRETCH.found(f"without {names} the rest fits, and leaves {size}", step, residual=left)
 
 
-def _stretches(model: ForwardModel, residual: Array) -> Iterator[_Stretch]:
+def _stretches(model: ForwardModel, residual: Array) -> Iterator[_SampleRange]:
     """Of each place, samples in a row that are off, and hardly any between them."""
     rows = model.rows
     usual = np.maximum(rows.estimated * rows.weight, _MAD * float(np.median(np.abs(residual))))
@@ -85,14 +88,14 @@ def _stretches(model: ForwardModel, residual: Array) -> Iterator[_Stretch]:
             samples = np.searchsorted(run.times, np.unique(rows.time[mine]))
             for part in _in_a_row(samples):
                 if _FEWEST <= len(part) <= _MOST * len(run.times):
-                    yield _Stretch(name, place, channels, int(part[0]), int(part[-1]))
+                    yield _SampleRange(name, place, channels, int(part[0]), int(part[-1]))
 
 
 def _in_a_row(samples: npt.NDArray[np.intp]) -> list[npt.NDArray[np.intp]]:
     return np.split(samples, np.flatnonzero(np.diff(samples) > _GAP) + 1)
 
 
-def _without(model: ForwardModel, stretches: list[_Stretch]) -> ForwardModel:
+def _without(model: ForwardModel, stretches: list[_SampleRange]) -> ForwardModel:
     """The model without these samples."""
     recordings = dict(model.measurement.recordings)
     for one in stretches:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from shoal.identification.forward import ForwardModel, Progress
-from shoal.identification.methods.lanes import Course, descend_many
+from shoal.identification.methods.lanes import SearchHistory, descend_many
 from shoal.identification.methods.outcome import Outcome, concluded
 from shoal.trajectory import Array
 
@@ -25,7 +25,7 @@ def differential_evolution(model: ForwardModel, rng: np.random.Generator, progre
     with model.off_the_clock():  # slow to import
         from scipy import optimize
 
-    course = Course(progress)
+    course = SearchHistory(progress)
     span = model.upper - model.lower
 
     def fitness(columns: Any) -> Any:
@@ -49,7 +49,7 @@ def cma_es(model: ForwardModel, rng: np.random.Generator, progress: Progress) ->
     # The package takes no box of one dimension; a second one is not looked at.
     size = max(2, len(model.lower))
     population = 4 + int(3 * np.log(size))
-    course = Course(progress)
+    course = SearchHistory(progress)
     ends = []
 
     def place(unit: Array) -> Array:

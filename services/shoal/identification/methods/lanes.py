@@ -2,7 +2,8 @@
 
 An iteration simulates the trial points of all descents together with their neighbours, side by side, so a Jacobian is
 there when its trial is accepted (Nielsen's damping rule; Madsen, Nielsen, Tingleff, Methods for non-linear least
-squares problems, 2004).
+squares problems, 2004). Unlike those of `numerics.levenberg_marquardt` these searches keep to active bounds, and leave
+where a better one is.
 """
 
 from __future__ import annotations
@@ -189,7 +190,7 @@ def best_apart(model: ForwardModel, points: Array, values: Array, count: int) ->
     return np.array(found[:count] or [points[0]])
 
 
-class Course(list[tuple[int, float, float]]):
+class SearchHistory(list[tuple[int, float, float]]):
     """Rows of (iteration, best, mean fitness), one for each population of a search; `progress` is told of each."""
 
     def __init__(self, progress: Progress) -> None:

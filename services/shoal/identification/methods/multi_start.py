@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from shoal.identification.forward import ForwardModel, Progress
-from shoal.identification.methods.lanes import Course, best_apart, descend_many
+from shoal.identification.methods.lanes import SearchHistory, best_apart, descend_many
 from shoal.identification.methods.outcome import Outcome, concluded
 from shoal.identification.methods.starts import starting_points
 from shoal.trajectory import Array
@@ -20,7 +20,7 @@ def multi_start(model: ForwardModel, rng: np.random.Generator, progress: Progres
     """Look at a Sobol sequence over the box, descend from its best points; `minima` are the others that were found."""
     poses = starting_points(model)
     points = screened(model, poses, rng)
-    course = Course(lambda *_: None)
+    course = SearchHistory(lambda *_: None)
     values = course.note(model.fitness(points))
     starts = best_apart(model, np.concatenate([poses, points]), np.concatenate([np.zeros(len(poses)), values]), STARTS)
     return concluded(model, descend_many(model, starts, progress), course)

@@ -79,7 +79,7 @@ def fit(model: ForwardModel, start: Array) -> Branch:
     """Levenberg-Marquardt of a few steps, which leaves near the start what the samples do not tell.
 
     The start counts as a prior whose standard deviation is a part of a parameter's range, against the deviation that
-    the fit has.
+    the fit has. So each step minimises another sum than the last, unlike in `numerics.levenberg_marquardt`.
     """
     span = model.upper - model.lower
     point, damping = start, 1e-3

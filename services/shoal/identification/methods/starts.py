@@ -1,6 +1,6 @@
 """Where to start: every pose that the first samples allow (both elbow branches), rates by their slope.
 
-The first samples fix a pose up to its mirror images. The poses are found by Gauss-Newton on the
+The first samples fix a pose up to its mirror images. The poses are found by the Levenberg-Marquardt method on the
 placement alone, from many starts at once; no motion is simulated.
 """
 
@@ -10,6 +10,8 @@ import numpy as np
 
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods.lanes import kept_apart
+from shoal.mechanics.numerics.levenberg_marquardt import levenberg_marquardt
+from shoal.mechanics.numerics.tile import Index
 from shoal.trajectory import Array
 
 _CANDIDATES = 16
@@ -17,10 +19,8 @@ _CANDIDATES = 16
 _MOST = 8
 """Starting points, at most."""
 _ITERATIONS = 30
-_SMALL_STEP = 1e-4
-"""Of an angle [rad]; a pose that moves less has arrived, as the steps shrink quadratically."""
-_STUCK = 100.0
-"""Damping of a pose that no step betters."""
+_GAIN, _CLOSE = 1e-3, 1e-6
+"""Poses are found where a step promises to lower the squared error by less than this part, or the error is less."""
 _FIRST_SAMPLES = 5
 _SAME = 1e-3
 """Two poses are the same if no parameter differs by more than this fraction of its range."""
@@ -100,28 +100,19 @@ def _poses(model: ForwardModel, name: str, middle: Array, angles: list[int], pos
     evenly = scatter(count, len(angles))
     points = np.repeat(middle[None], count, axis=0)
     points[:, angles] = model.lower[angles] + evenly * (model.upper - model.lower)[angles]
-    damping = np.full(count, 1e-3)
-    error, jacobian = _pose_error(model, name, points, angles, pose)
-    cost = np.sum(error**2, axis=1)
+
+    def evaluate(at: Array, numbers: Index) -> tuple[Array, Array]:
+        placed = points[numbers]
+        placed[:, angles] = at
+        return _pose_error(model, name, placed, angles, pose)
+
+    found = levenberg_marquardt(
+        evaluate, damped_steps, points[:, angles], gain=_GAIN, close=_CLOSE, most=_ITERATIONS,
+        move=lambda at, step: np.clip(at + step, model.lower[angles], model.upper[angles]),
+    )  # fmt: skip
+    points[:, angles] = found.points
     # Not every pose of a closed loop can be assembled.
-    cost[~np.isfinite(cost)] = np.inf
-    going = np.flatnonzero(np.isfinite(cost))
-    for _ in range(_ITERATIONS if going.size else 0):
-        step = damped_steps(error[going], jacobian[going], damping[going])
-        trial = points[going]
-        trial[:, angles] -= step
-        trial = np.clip(trial, model.lower, model.upper)
-        trial_error, trial_jacobian = _pose_error(model, name, trial, angles, pose)
-        trial_cost = np.sum(trial_error**2, axis=1)
-        better = trial_cost < cost[going]
-        small = np.max(np.abs(trial - points[going]), axis=1) < _SMALL_STEP
-        damping[going] *= np.where(better, 0.1, 10.0)
-        taken = going[better]
-        points[taken], error[taken], jacobian[taken] = trial[better], trial_error[better], trial_jacobian[better]
-        cost[taken] = trial_cost[better]
-        going = going[~small & (damping[going] < _STUCK)]
-        if not going.size:
-            break
+    cost = np.where(np.isfinite(found.norms), found.norms**2, np.inf)
     return _distinct(model, points, cost, angles)
 
 
@@ -136,14 +127,14 @@ def scatter(count: int, dimensions: int) -> Array:
     return np.asarray((0.5 + np.outer(np.arange(1, count + 1), ratio ** -np.arange(1.0, dimensions + 1))) % 1.0)
 
 
-def damped_steps(error: Array, jacobian: Array, damping: Array) -> Array:
-    """What Levenberg-Marquardt takes off each point, (points, angles)."""
+def damped_steps(error: Array, jacobian: Array, damping: Array, _: Index) -> Array:
+    """Return the Levenberg-Marquardt step of each point, (points, angles), damped in parts of the trace."""
     normal = np.einsum("nck,ncl->nkl", jacobian, jacobian)
     gradient = np.einsum("nck,nc->nk", jacobian, error)
     unit = np.eye(normal.shape[1])
     scale = np.trace(normal, axis1=1, axis2=2)[:, None, None] * unit
     damped = normal + damping[:, None, None] * scale + 1e-14 * unit
-    return np.asarray(np.linalg.solve(damped, gradient[..., None])[..., 0])
+    return np.asarray(-np.linalg.solve(damped, gradient[..., None])[..., 0])
 
 
 def _distinct(model: ForwardModel, points: Array, cost: Array, angles: list[int]) -> Array:

@@ -16,7 +16,7 @@ _PACES = 16
 """So many of them, at most."""
 
 
-class Together(NamedTuple):
+class LaneGroup(NamedTuple):
     """Lanes that are simulated at once.
 
     lanes: their numbers; instants: of the simulation [s]; rows: the instant that each sample shows, (lanes, samples)
@@ -27,7 +27,7 @@ class Together(NamedTuple):
     rows: npt.NDArray[np.intp]
 
 
-def by_clock(times: Array, clock: Array, delay: Array, possible: npt.NDArray[np.bool_]) -> Iterator[Together]:
+def by_clock(times: Array, clock: Array, delay: Array, possible: npt.NDArray[np.bool_]) -> Iterator[LaneGroup]:
     """The possible lanes, those together whose clocks hardly differ.
 
     times: of the samples, by the clock of the recording [s]; clock, delay [s], possible: (lanes,). Until its time zero
@@ -40,7 +40,7 @@ def by_clock(times: Array, clock: Array, delay: Array, possible: npt.NDArray[np.
         if lanes.size:
             instants, shown = np.unique(moments[together], return_inverse=True)
             rows = shown.reshape(len(together), -1)[np.searchsorted(together, own[lanes])]
-            yield Together(lanes, instants, rows)
+            yield LaneGroup(lanes, instants, rows)
 
 
 def _distinct(rows: Array) -> tuple[Array, npt.NDArray[np.intp]]:

@@ -16,7 +16,7 @@ _FEWEST = 3
 
 
 @dataclass(frozen=True)
-class Held:
+class HeldOut:
     """Samples of a window that is predicted instead of fitted.
 
     window [s]: as it is stated, by the clock of the table; times [s], (samples,), and values, (samples, channels): as
@@ -49,7 +49,7 @@ class Recording:
     noise: Array
     stated: Clocked = field(default_factory=Clocked)
     notes: tuple[str, ...] = ()
-    held: tuple[Held, ...] = ()
+    held: tuple[HeldOut, ...] = ()
     begin: float = 0.0
     table: str = ""
     turns: Array | float = 0.0
@@ -68,7 +68,7 @@ class Recording:
                 empty = f"all cells of its {np.count_nonzero(inside)} rows are empty"
                 why = empty if np.any(inside) else f"the recording covers {span}"
                 raise InputError(f"hold_out: no sample from {window[0]:g} s to {window[1]:g} s; {why}")
-            held.append(Held(window, self.times[inside], self.values[inside]))
+            held.append(HeldOut(window, self.times[inside], self.values[inside]))
             fitted &= ~inside
         left = np.isfinite(self.values[fitted]).sum(axis=0)
         if not np.all(left) or np.count_nonzero(fitted) < _FEWEST:

@@ -17,7 +17,7 @@ from shoal.identification.recording.swaps import mend
 from shoal.identification.recording.unit_line import with_units
 from shoal.scene.load import read_yaml
 from shoal.scene.record import one_line
-from shoal.table import Mask, Table, load_table
+from shoal.table import ColumnTable, Mask, load_table
 from shoal.table_units import SI
 from shoal.trajectory import Array
 
@@ -119,7 +119,7 @@ def sampled(source: FileSource, channels: tuple[Channel, ...]) -> tuple[Recordin
         raise InputError(f"{path}: {error}") from None
 
 
-def _times(source: FileSource, table: Table) -> Array:
+def _times(source: FileSource, table: ColumnTable) -> Array:
     """Times [s], (rows,), as recorded or counted. Raises InputError."""
     if len(table.rows) == 0:
         raise InputError(f"{table.path}: only 0 samples in the file; at least {_FEWEST} are needed")

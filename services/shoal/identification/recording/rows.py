@@ -18,7 +18,7 @@ _LEAST = 1e-6
 
 
 @dataclass(frozen=True)
-class Rows:
+class ResidualRows:
     """The rows of a measurement; those of priors, at the end of a residual vector, are not among them.
 
     recording, time, channel: number of the recording, time by its clock [s] and number of the channel, (rows,) each
@@ -32,7 +32,7 @@ class Rows:
     whole: Measurement
 
     @classmethod
-    def of(cls, measurement: Measurement, whole: Measurement | None = None) -> Rows:
+    def of(cls, measurement: Measurement, whole: Measurement | None = None) -> ResidualRows:
         """The rows in the order of recordings, samples and channels, without gaps."""
         parts = []
         for number, recording in enumerate(measurement.recordings.values()):

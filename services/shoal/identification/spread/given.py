@@ -10,6 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from shoal.findings import Finding
+from shoal.identification.findings import UNCERTAIN_INPUT
 from shoal.identification.spread.covariance import Noise
 from shoal.identification.spread.uncertainty import Linearisation
 from shoal.trajectory import Array
@@ -48,11 +50,12 @@ class Given:
         parts = np.concatenate([at.parts, self._share(at)[None]])
         return replace(at, parts=parts, noise=(*at.noise, noise), given=at.given + 1)
 
-    def sentence(self, at: Linearisation, names: Sequence[str]) -> str:
-        """Which parameters it makes less certain, at a linearisation that has its share; empty if none."""
+    def findings(self, at: Linearisation, names: Sequence[str]) -> list[Finding]:
+        """Return which parameters it makes less certain, at a linearisation that has its share, if any."""
         shares, variance = np.diag(self._share(at)), np.diag(at.covariance)
         widened = [name for name, part, all_ in zip(names, shares, variance, strict=True) if part > _NOTICED * all_ > 0]
-        return f"{self.what} widens the interval of {', '.join(widened)}{self.remedy}" if widened else ""
+        text = f"{self.what} widens the interval of {', '.join(widened)}{self.remedy}"
+        return [UNCERTAIN_INPUT.found(text)] if widened else []
 
     def _share(self, at: Linearisation) -> Array:
         shifts = self.moved @ at.pseudo_inverse.T

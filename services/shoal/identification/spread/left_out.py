@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shoal.identification.forward import ForwardModel
-from shoal.identification.recording.measurement import Held
+from shoal.identification.recording.measurement import HeldOut
 from shoal.identification.spread.stated_error import Fit, block_of, stated, unevenness
 from shoal.identification.spread.uncertainty import LEVEL, linearise
 
@@ -21,7 +21,7 @@ _MOST = 0.5
 """Of a fit: no longer part is left out."""
 
 
-def allowance(model: ForwardModel, name: str, held: Held, fit: Fit) -> float:
+def allowance(model: ForwardModel, name: str, held: HeldOut, fit: Fit) -> float:
     """By what the stated error has to be made larger so that it holds for parts of the fit that are left out of it."""
     number = list(model.measurement.recordings).index(name)
     found = 1.0
@@ -30,7 +30,7 @@ def allowance(model: ForwardModel, name: str, held: Held, fit: Fit) -> float:
     return found
 
 
-def _parts(model: ForwardModel, number: int, held: Held, count: int) -> Iterator[tuple[Mask, Mask]]:
+def _parts(model: ForwardModel, number: int, held: HeldOut, count: int) -> Iterator[tuple[Mask, Mask]]:
     """Rows that are left out, and rows that are fitted instead, (rows,) each, as far from each other as the window is.
 
     Beyond the end (or before the beginning) of what was fitted nothing behind a part is fitted either.

@@ -17,6 +17,8 @@ import numpy as np
 
 from shoal.compile import clock
 from shoal.errors import InputError
+from shoal.findings import Finding
+from shoal.identification import findings as kinds
 from shoal.identification.deadline import TimeIsUp
 from shoal.identification.forward import ForwardModel
 from shoal.identification.spread.covariance import Block
@@ -49,7 +51,7 @@ _NEWS = 0.2
 
 
 @dataclass(frozen=True)
-class Marginal:
+class PosteriorMarginal:
     """Of one parameter in its own unit: moments, median, the central 95 %, and how much the draws are worth for it.
 
     size, tail: effective sizes for the middle and for the tails, see `mixing`
@@ -74,7 +76,7 @@ class Posterior:
 
     names: tuple[str, ...]
     draws: Array
-    marginals: dict[str, Marginal]
+    marginals: dict[str, PosteriorMarginal]
     noise: str
     wanted: int
     converged: bool
@@ -99,15 +101,16 @@ class Posterior:
         """The least effective size of all parameters."""
         return min(min(one.size, one.tail) for one in self.marginals.values())
 
-    def sentence(self) -> str:
-        """Why the draws are not what was asked for; empty if they are."""
+    def findings(self) -> list[Finding]:
+        """Return why the draws are not what was asked for, if they are not."""
         if self.converged:
-            return ""
+            return []
         most = max(one.r_hat for one in self.marginals.values())
-        return (
+        text = (
             f"the posterior has not converged: after {len(self.flat)} draws R-hat is {most:.3f} (at most {MIXED:g}), "
-            f"the effective size {self.worth:.0f} of {self.wanted}"
         )
+        text += f"the effective size {self.worth:.0f} of {self.wanted}"
+        return [kinds.NOT_MIXED.found(text, r_hat=most, effective_size=self.worth)]
 
     def to_json(self) -> dict[str, Any]:
         """All but the draws."""
@@ -203,9 +206,9 @@ def posterior(
     return found
 
 
-def news(found: Posterior, values: Mapping[str, Value]) -> list[str]:
-    """A sentence for every parameter whose central 95 % are not the interval that stands in the answer."""
-    said, model = [], list[str]()
+def differences(found: Posterior, values: Mapping[str, Value]) -> list[Finding]:
+    """Return a finding for every parameter whose central 95 % are not the interval of the answer."""
+    said, model = list[Finding](), list[str]()
     for name, one in found.marginals.items() if found.converged else ():
         value = values[name]
         apart = max(abs(one.lower - value.lower), abs(one.upper - value.upper)) - _NEWS * (one.upper - one.lower)
@@ -214,9 +217,11 @@ def news(found: Posterior, values: Mapping[str, Value]) -> list[str]:
         if apart <= abs(value.correction or 0.0) + abs(value.theory or 0.0):
             model.append(name)
         else:
-            said.append(f"the posterior of {name} has 95 % between {one.lower:.6g} and {one.upper:.6g}")
+            text = f"the posterior of {name} has 95 % between {one.lower:.6g} and {one.upper:.6g}"
+            said.append(kinds.POSTERIOR_DIFFERS.found(text, lower=one.lower, upper=one.upper))
     if model:
-        said.append(f"the posterior of {', '.join(model)} leaves the error of the model out, which the interval has")
+        text = f"the posterior of {', '.join(model)} leaves the error of the model out, which the interval has"
+        said.append(kinds.POSTERIOR_DIFFERS.found(text))
     return said
 
 
@@ -245,11 +250,11 @@ def _told(
     )
 
 
-def _marginal(draws: Array) -> Marginal:
+def _marginal(draws: Array) -> PosteriorMarginal:
     """Of one parameter's draws (ensembles, steps, walkers)."""
     # Ranks are scipy's, which an identification without draws need not load.
     from shoal.identification.spread.mixing import bulk_size, r_hat, tail_size
 
     lower, median, upper = (float(x) for x in np.quantile(draws, [0.5 - LEVEL / 2, 0.5, 0.5 + LEVEL / 2]))
     sizes = bulk_size(draws), tail_size(draws), r_hat(draws)
-    return Marginal(float(draws.mean()), float(draws.std(ddof=1)), median, lower, upper, *sizes)
+    return PosteriorMarginal(float(draws.mean()), float(draws.std(ddof=1)), median, lower, upper, *sizes)

@@ -15,8 +15,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from shoal.findings import Finding
+from shoal.identification import findings as kinds
 from shoal.identification.forward import ForwardModel
-from shoal.identification.recording.measurement import Held
+from shoal.identification.recording.measurement import HeldOut
 from shoal.identification.recording.units import of_channel
 from shoal.identification.spread.covariance import Block, Noise
 from shoal.identification.spread.given import EXACT, Given
@@ -100,14 +102,16 @@ class Prediction:
         """How many times worse than stated it is: RMS over limit of the worst channel, nan where there is no limit."""
         return max((channel.rms / channel.limit for channel in self.channels), default=float("nan"))
 
-    def sentence(self, named: bool) -> str:
-        """The outcome in words; named: whether the recording has to be."""
+    def finding(self, named: bool) -> Finding:
+        """Return how well the window is predicted; named: whether the text names the recording."""
         begin, end = self.window
         known = self.inside is not None
         off = ", ".join(f"{c.name} {c.rms:.2g} {c.unit}" + f", limit {c.limit:.2g}" * known for c in self.channels)
         where = f" of {self.recording}" if named else ""
         held = {True: "as well as the estimate states", False: "worse than the estimate states", None: self.why}
-        return f"held out from {begin:g} s to {end:g} s{where}: predicted {held[self.inside]} (RMS: {off})"
+        kind = kinds.MISPREDICTED if self.inside is False else kinds.PREDICTION
+        text = f"held out from {begin:g} s to {end:g} s{where}: predicted {held[self.inside]} (RMS: {off})"
+        return kind.found(text, begin=begin, end=end, ratio=self.ratio)
 
     def to_json(self) -> dict[str, Any]:
         """What `--json` tells of it."""
@@ -146,7 +150,7 @@ def predictions(
 
 
 def _predicted(
-    model: ForwardModel, point: Array, name: str, held: Held, fit: Fit | None, error: ModelError
+    model: ForwardModel, point: Array, name: str, held: HeldOut, fit: Fit | None, error: ModelError
 ) -> Prediction:
     channels = model.measurement.recordings[name].channels
     window = _of_window(model, name, held)
@@ -203,7 +207,7 @@ def _predicted(
     return Prediction(name, held.window, told_of, held.times, held.values, predicted, half, larger, why)
 
 
-def _of_window(model: ForwardModel, name: str, held: Held) -> ForwardModel:
+def _of_window(model: ForwardModel, name: str, held: HeldOut) -> ForwardModel:
     """The model of the samples of a window. Other recordings stay with one sample, as parameters are named by them."""
     recordings = {
         other: replace(one, times=one.times[:1], values=np.zeros((1, len(one.channels))))

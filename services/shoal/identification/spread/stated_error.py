@@ -41,7 +41,7 @@ def block_of(model: ForwardModel, recording: int, channel: int, fit: Fit) -> int
 
 
 @dataclass(frozen=True)
-class Stated:
+class ErrorBand:
     """Of one channel: expected RMS, what it stays below, and the half width of the band, (samples,)."""
 
     expected: float
@@ -62,7 +62,7 @@ def unevenness(residual: Array, count: int) -> float:
     return float(np.var(parts, ddof=1)) / power**2
 
 
-def stated(slopes: Array, at: Linearisation, block: int, weight: float, level: float, uneven: float = 0.0) -> Stated:
+def stated(slopes: Array, at: Linearisation, block: int, weight: float, level: float, uneven: float = 0.0) -> ErrorBand:
     """What an estimate says of an RMS over samples with derivatives (samples, parameters), all in SI units.
 
     The mean square of the error is a sum of squares of normal numbers with different variances: by its mean and its
@@ -87,4 +87,4 @@ def stated(slopes: Array, at: Linearisation, block: int, weight: float, level: f
     above = chi_square_above(freedom, 1.0 - level) / freedom * mean * doubt**2
     each = variance + np.einsum("ni,ij,nj->n", slopes, at.covariance, slopes)
     half = np.hypot(quantile(shares, at.noise) * np.sqrt(each), follows * np.linalg.norm(lever, axis=1))
-    return Stated(float(np.sqrt(mean)), float(np.hypot(np.sqrt(above), systematic)), half)
+    return ErrorBand(float(np.sqrt(mean)), float(np.hypot(np.sqrt(above), systematic)), half)

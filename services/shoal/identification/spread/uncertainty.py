@@ -12,7 +12,7 @@ from shoal.identification.spread.chances import student_above
 from shoal.identification.spread.covariance import Block, Noise, correlate, estimate_noise
 from shoal.trajectory import Array
 
-_ROUND_OFF = 1e-12
+_RANK = 1e-12
 """Of the largest singular value: a smaller one is round-off, whatever the derivatives say."""
 _UNTRIED = 1e-6
 """Likewise of derivatives by a single step, whose error is not known."""
@@ -75,7 +75,7 @@ def told(singular: Array, right: Array, error: Array | None) -> npt.NDArray[np.b
     largest = np.max(singular, initial=0.0)
     if error is None:
         return np.asarray(singular > _UNTRIED * largest)
-    return np.asarray(singular > np.maximum(np.linalg.norm(error @ right.T, axis=0), _ROUND_OFF * largest))
+    return np.asarray(singular > np.maximum(np.linalg.norm(error @ right.T, axis=0), _RANK * largest))
 
 
 def inverse(jacobian: Array, scale: Array, error: Array | None = None) -> tuple[Array, Array, Array]:

@@ -18,13 +18,18 @@ import scipy.sparse
 
 from shoal.mechanics.analysis.evaluate import Evaluation, Evaluator
 from shoal.mechanics.analysis.freedom import Freedom, Metric
-from shoal.mechanics.analysis.small_motions import ROUND, Spectrum, Tangent, parts_of, spectrum
+from shoal.mechanics.analysis.small_motions import ROUND, BoundedMatrix, Spectrum, parts_of, spectrum
+from shoal.mechanics.numerics.newton import Root, newton
 from shoal.mechanics.numerics.tile import Array
 
 CLOSE = 1e-11
 """Converged: a correction of the bodies [rms displacement / size of the machine] below this,"""
 STALLED = 1e-7
 """or one below this that round-off keeps from getting smaller."""
+CLOSED = 1e-14
+"""Joints that gape by less [m] are closed to round-off."""
+DIVERGENT = 3.0
+"""A correction of so many times the machine's size leads nowhere."""
 LONGEST = 0.2
 """Longest step of the descent, as a fraction of the machine's size,"""
 WIDEST = 1.5
@@ -58,16 +63,6 @@ class View(NamedTuple):
     multipliers: Array
     unbalanced: Array
     turning: Array
-
-
-class Found(NamedTuple):
-    """Result of an iteration. correction: its last, relative to the machine's size."""
-
-    q: Array
-    converged: bool
-    iterations: int
-    correction: float
-    message: str = ""
 
 
 class Balance:
@@ -109,25 +104,25 @@ class Balance:
         basis = view.freedom.basis
         return np.asarray(basis.T @ (full @ basis))
 
-    def tangent(self, q: Array, view: View, load: float = 1.0) -> Tangent:
+    def tangent(self, q: Array, view: View, load: float = 1.0) -> BoundedMatrix:
         """The stiffness K + sum lambda_k C_k,qq in all coordinates."""
         loose = self.evaluator.stiffness(q, self.t, load=load)
         full = self.evaluator.stiffness(q, self.t, multipliers=view.multipliers, load=load)
-        return Tangent(full, ROUND * (abs(loose) + abs(full - loose)))
+        return BoundedMatrix(full, ROUND * (abs(loose) + abs(full - loose)))
 
-    def at_rest(self, q: Array, view: View) -> Tangent:
+    def at_rest(self, q: Array, view: View) -> BoundedMatrix:
         """Return the tangent at an equilibrium, where the remaining forces are round-off."""
         found, evaluation = self.tangent(q, view), view.evaluation
         if self.residual(view) > BALANCED:
             return found
         left = np.abs(evaluation.force - evaluation.jacobian.T @ view.multipliers) / self.size
-        return Tangent(found.matrix, found.bound + OFF * scipy.sparse.diags_array(left))
+        return BoundedMatrix(found.matrix, found.bound + OFF * scipy.sparse.diags_array(left))
 
     def spectrum(self, q: Array, view: View, load: float = 1.0) -> Spectrum:
         """The squared frequencies of small motions, where the loads have a potential."""
         return self.spectrum_of(self.tangent(q, view, load), view)
 
-    def spectrum_of(self, stiffness: Tangent, view: View) -> Spectrum:
+    def spectrum_of(self, stiffness: BoundedMatrix, view: View) -> Spectrum:
         """Return the spectrum of a symmetric stiffness."""
         parts = parts_of(self.evaluator.mass, view.evaluation.jacobian)
         return spectrum(stiffness, view.freedom.basis, self.evaluator.mass, parts)
@@ -149,45 +144,37 @@ class Balance:
         """Return the nearest position (metric of M) that satisfies the joints, and the remaining violation."""
         if self.evaluator.model.constraints.size == 0:
             return q, 0.0
-        gap = np.inf
-        for _ in range(12):
-            evaluation = self.evaluator.at(q, t=self.t)
-            gap = float(np.max(np.abs(evaluation.gap)))
-            if not gap > 1e-14:
-                break
-            move = self._closing(evaluation, self._freedom(evaluation))
-            q = q + move
-            if np.max(np.abs(move)) < 1e-15 * np.max(np.abs(q), initial=1.0):
-                break
-        return q, gap
 
-    def newton(self, q: Array, load: float = 1.0, most: int = 20) -> Found:
-        """Newton's method with full steps."""
-        last = np.inf
-        for iteration in range(1, most + 1):
+        def correct(q: Array) -> tuple[Array, float]:
+            evaluation = self.evaluator.at(q, t=self.t)
+            if np.max(np.abs(evaluation.gap)) <= CLOSED:
+                return np.zeros_like(q), 0.0
+            move = self._closing(evaluation, self._freedom(evaluation))
+            return move, float(np.max(np.abs(move)) / np.max(np.abs(q), initial=1.0))
+
+        q = newton(correct, q, close=CLOSE, most=12).point
+        return q, float(np.max(np.abs(self.evaluator.at(q, t=self.t).gap)))
+
+    def newton(self, q: Array, load: float = 1.0, most: int = 20) -> Root[Array]:
+        """Newton's method with full steps; corrections relative to the machine's size."""
+
+        def correct(q: Array) -> tuple[Array, float]:
             view = self.look(q, load)
             stiffness = self.evaluator.stiffness(q, self.t, multipliers=view.multipliers, load=load)
             basis = view.freedom.basis
             back = self._closing(view.evaluation, view.freedom)
-            along = stiffness @ basis
-            try:
-                y = np.linalg.solve(basis.T @ along, view.unbalanced - basis.T @ (stiffness @ back))
-            except np.linalg.LinAlgError:
-                return Found(q, False, iteration, last, "the tangent stiffness is singular")
-            q = q + back + basis @ y
-            correction = float(np.linalg.norm(y)) / self.unit + float(np.max(np.abs(back), initial=0.0))
-            if not correction < 3.0:
-                break
-            if correction < CLOSE or (correction < STALLED and correction > 0.3 * last):
-                return Found(q, True, iteration, correction)
-            last = correction
-        return Found(q, False, iteration, last, "Newton's method does not converge")
+            y = np.linalg.solve(basis.T @ (stiffness @ basis), view.unbalanced - basis.T @ (stiffness @ back))
+            size = float(np.linalg.norm(y)) / self.unit + float(np.max(np.abs(back), initial=0.0))
+            return back + basis @ y, size
+
+        return newton(correct, q, close=CLOSE, round_off=STALLED, divergent=DIVERGENT, most=most)
 
     def descend(
         self, q: Array, turn: Callable[[Array, Array], float], follow: Callable[[Array], None], most: int = 400
-    ) -> Found:
-        """Go down in the potential until nothing pulls any more (which is so on a summit, too).
+    ) -> Root[Array]:
+        """Descend in the potential to a stationary point, by Newton steps with absolute curvatures.
 
+        Unlike in `newton` the potential judges each step, and the damping depends on what lowers it.
         turn: the largest turn [rad] of a body between two states; follow: counts the turns, called after every step.
         """
         q, _ = self.restore(q)
@@ -200,7 +187,7 @@ class Balance:
             idle = (np.abs(curvature) <= zero) & (np.abs(pull) <= SEEN * self._scale(view))
             pull[idle] = 0.0
             if self.residual(view) < SEEN**1.3:
-                return Found(q, True, iteration, correction)
+                return Root(q, True, iteration, correction)
             potential = view.evaluation.potential
             noise = 1e-13 * (abs(view.evaluation.strain) + abs(view.evaluation.gravity) + abs(potential))
             while True:
@@ -222,29 +209,31 @@ class Balance:
                     break
                 if correction < CLOSE:
                     good = self.residual(view) < np.sqrt(SEEN)
-                    return Found(q, good, iteration, correction, "" if good else "the descent of the potential stalls")
+                    return Root(q, good, iteration, correction, "" if good else "the descent of the potential stalls")
                 shift = max(4.0 * shift, float(np.linalg.norm(pull)) / max(float(np.linalg.norm(y)), 1e-300))
             held = bool(np.all((curvature > zero) | idle))
             follow(trial)
             q, view, shift = trial, ahead, shift / 8.0 if correction > 1e-6 else 0.0
             if held and correction < CLOSE:
-                return Found(q, True, iteration, correction)
+                return Root(q, True, iteration, correction)
             if self._way(q - begin) > FAR * self.unit:
-                return Found(q, False, iteration, correction, FALLS)
-        return Found(q, False, most, correction, f"not at rest after {most} steps downhill")
+                return Root(q, False, iteration, correction, FALLS)
+        return Root(q, False, most, correction, f"not at rest after {most} steps downhill")
 
     def creep(
         self, q: Array, turn: Callable[[Array, Array], float], follow: Callable[[Array], None], most: int = 400
-    ) -> Found:
-        """Go where the forces pull, M dq/ds = Q, until nothing pulls any more; turn, follow: see `descend`.
+    ) -> Root[Array]:
+        """Follow the overdamped motion M dq/ds = Q to rest (pseudo-transient continuation).
 
-        No step is so long that it would go back to a place that pushes away.
+
+        Unlike in `newton` the damping is the time step of that motion: no step goes back to where it is unstable.
+        turn, follow: see `descend`
         """
         q, _ = self.restore(q)
         begin, view, slower, correction = q, self.look(q), 1.0, np.inf
         for iteration in range(1, most + 1):
             if self.residual(view) < SEEN**1.3:
-                return Found(q, True, iteration, correction)
+                return Root(q, True, iteration, correction)
             stiffness = self.hessian(q, view)
             pushed = max(0.0, -2.0 * float(np.min(scipy.linalg.eigvals(stiffness).real)))
             pull = float(np.linalg.norm(view.unbalanced)) / (LONGEST * self.unit)
@@ -259,24 +248,24 @@ class Balance:
             follow(trial)
             q, view, slower = trial, self.look(trial), max(1.0, slower / 4.0)
             if correction < CLOSE or (correction < STALLED and self.residual(view) < SEEN):
-                return Found(q, True, iteration, correction)
+                return Root(q, True, iteration, correction)
             if self._way(q - begin) > FAR * self.unit:
-                return Found(q, False, iteration, correction, FALLS)
-        return Found(q, False, most, correction, f"not at rest after {most} steps")
+                return Root(q, False, iteration, correction, FALLS)
+        return Root(q, False, most, correction, f"not at rest after {most} steps")
 
     def _way(self, move: Array) -> float:
         """Return the length of a move [kg^1/2 m]; its components include curvatures, which may be large."""
         return float(np.sqrt(max(0.0, float(move @ (self.evaluator.mass @ move)))))
 
     def _relax(self, q: Array, stiff: float) -> tuple[Array, float]:
-        """Newton's method in the directions stiffer than `stiff` [rad^2/s^2] alone."""
-        gap = 0.0
-        for _ in range(4):
+        """Newton's method in the directions stiffer than `stiff` [rad^2/s^2] alone; as `restore`."""
+
+        def correct(q: Array) -> tuple[Array, float]:
             view = self.look(q)
             curvature, modes = scipy.linalg.eigh(self.hessian(q, view))
             pull = modes.T @ view.unbalanced
             y = np.where(curvature > stiff, pull / np.where(curvature > stiff, curvature, 1.0), 0.0)
-            q, gap = self.restore(q + view.freedom.basis @ (modes @ y))
-            if float(np.linalg.norm(y)) < 1e-6 * self.unit:
-                break
-        return q, gap
+            return view.freedom.basis @ (modes @ y), float(np.linalg.norm(y)) / self.unit
+
+        relaxed = newton(correct, q, close=1e-6, most=4, move=lambda q, step: self.restore(q + step)[0])
+        return self.restore(relaxed.point)

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shoal.mechanics.analysis.evaluate import Evaluator, points
+from shoal.mechanics.affine import points
+from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.analysis.felt import TURN, Felt, quarter
 from shoal.mechanics.assembly.build import build
 from shoal.mechanics.frames import RigidFrame
@@ -91,16 +92,16 @@ def machines(scene: Scene, values: Mapping[str, Array], course: Course, lanes: l
     picked = {path: np.asarray(numbers, dtype=float)[lanes] for path, numbers in values.items()}
     model = build(scene.with_lanes(picked), len(lanes), float(course.times[-1]))
     for k, lane in enumerate(lanes):
-        yield _felt(Evaluator(model, k), course, lane, k)
+        yield _quantities(Evaluator(model, k), course, lane, k)
 
 
 def machine(scene: Scene, values: Mapping[str, Array], course: Course, lane: int) -> Felt:
     """A lane of a scene along its motion, on a model of its own. Raises InputError."""
     one = scene.with_values({path: float(numbers[lane]) for path, numbers in values.items()})
-    return _felt(Evaluator.of(one, horizon=float(course.times[-1])), course, lane, 0)
+    return _quantities(Evaluator.of(one, horizon=float(course.times[-1])), course, lane, 0)
 
 
-def _felt(evaluator: Evaluator, course: Course, lane: int, of_model: int) -> Felt:
+def _quantities(evaluator: Evaluator, course: Course, lane: int, of_model: int) -> Felt:
     rigid = _Rigid(evaluator, course, lane, of_model)
     return Felt(evaluator, course.times, rigid.q, rigid.v, rigid.way, of_model)
 

@@ -15,7 +15,7 @@ import numpy.typing as npt
 import scipy.linalg
 
 from shoal.mechanics.analysis.balance import Balance, View
-from shoal.mechanics.analysis.small_motions import ROUND, TENSION, Spectrum, Tangent
+from shoal.mechanics.analysis.small_motions import ROUND, TENSION, BoundedMatrix, Spectrum
 from shoal.mechanics.numerics.tile import Array
 
 Complex = npt.NDArray[np.complex128]
@@ -55,7 +55,7 @@ def small(balance: Balance, q: Array, view: View) -> Roots:
     found = balance.spectrum_of(symmetric, view)
     if not follows and not np.any(friction.data):
         return undamped(found)
-    return roots(stiffness, Tangent(friction, ROUND * abs(friction.copy())), found, follows=follows)
+    return roots(stiffness, BoundedMatrix(friction, ROUND * abs(friction.copy())), found, follows=follows)
 
 
 def undamped(found: Spectrum) -> Roots:
@@ -67,7 +67,7 @@ def undamped(found: Spectrum) -> Roots:
     return Roots(values, found.shapes.astype(complex), levels).ordered()
 
 
-def roots(stiffness: Tangent, damping: Tangent, found: Spectrum, *, follows: bool) -> Roots:
+def roots(stiffness: BoundedMatrix, damping: BoundedMatrix, found: Spectrum, *, follows: bool) -> Roots:
     """The roots in the modes of the symmetric part of the stiffness. follows: whether it has another part."""
     shapes, squares, levels = found.shapes[:, :AT_MOST].copy(), found.values[:AT_MOST], found.levels[:AT_MOST]
     if follows:
@@ -94,7 +94,12 @@ def roots(stiffness: Tangent, damping: Tangent, found: Spectrum, *, follows: boo
 
 
 def _coupled(
-    stiffness: Tangent, damping: Tangent, shapes: Array, matrix: Array, held: npt.NDArray[np.bool_], follows: bool
+    stiffness: BoundedMatrix,
+    damping: BoundedMatrix,
+    shapes: Array,
+    matrix: Array,
+    held: npt.NDArray[np.bool_],
+    follows: bool,
 ) -> tuple[Complex, Complex, Array]:
     """Roots, their shapes in the given ones, and levels. matrix: the stiffness in the shapes, 0 but for `held`."""
     n = len(matrix)

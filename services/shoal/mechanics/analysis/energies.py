@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from shoal.mechanics import plane
-from shoal.mechanics.analysis.evaluate import points
+from shoal.mechanics.affine import points
 from shoal.mechanics.analysis.felt import Felt
 from shoal.mechanics.analysis.free_bodies import FreeBodies
 from shoal.mechanics.frames import RigidFrame

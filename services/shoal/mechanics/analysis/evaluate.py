@@ -6,17 +6,15 @@ statics and small motions; the time loop does not come this way.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import scipy.sparse
 
 from shoal.compile import structures
 from shoal.mechanics import forces, functions, plane
-from shoal.mechanics.affine import Affine
 from shoal.mechanics.analysis import evaluations
 from shoal.mechanics.analysis.load_stiffness import driven, in_plane, in_space, of_drives
 from shoal.mechanics.dynamics import derived_rows, work_space
@@ -58,35 +56,6 @@ class Evaluation:
     def potential(self) -> float:
         """Strain energy, gravity and applied loads together [J]."""
         return self.strain + self.gravity + self.applied
-
-
-class Points(NamedTuple):
-    """Vectors that are affine in the coordinates: matrix (vectors, d, unknowns) and constant (vectors, d)."""
-
-    matrix: Array
-    constant: Array
-
-    def at(self, q: Array) -> Array:
-        """The vectors at the coordinates q, (vectors, d)."""
-        return self.matrix @ q + self.constant
-
-    def turning(self, q: Array) -> Array:
-        """Return the derivatives of the angles [rad] of directions at q, about z, (vectors, unknowns)."""
-        now = self.at(q)[:, :2]
-        x, y = self.matrix.transpose(1, 0, 2)[:2]
-        return np.asarray(plane.cross(now.T[..., None], (x, y)) / np.sum(now**2, axis=1)[:, None])
-
-
-def points(vectors: Sequence[Affine], unknowns: int, lane: int = 0) -> Points:
-    """Vectors of a placement as one matrix, in one of its lanes."""
-    dimensions = len(vectors[0].constant) if vectors else plane.DIMENSIONS
-    matrix = np.zeros((len(vectors), dimensions, unknowns))
-    constant = np.zeros((len(vectors), dimensions))
-    for k, vector in enumerate(vectors):
-        constant[k] = vector.constant[:, lane % vector.constant.shape[1]]
-        for unknown, coefficient in vector.terms.items():
-            matrix[k, :, unknown] += coefficient[:, lane % coefficient.shape[1]]
-    return Points(matrix, constant)
 
 
 class Evaluator:

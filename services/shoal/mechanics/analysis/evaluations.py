@@ -13,7 +13,7 @@ from numba import njit, typeof, types
 
 from shoal.compile import function_pointers, structures
 from shoal.compile.pointers import pointer, raw_type, shift
-from shoal.compile.structures import load
+from shoal.compile.structures import Reference
 from shoal.mechanics import constraints, dynamics, kernels
 from shoal.mechanics.derived import derive
 from shoal.mechanics.dynamics import Work
@@ -85,7 +85,7 @@ def _run(
 
 def _kinds(tile: Tile, arrays: Arrays, room: Work) -> tuple[Any, ...]:
     number = types.float64
-    structure = (types.CPointer(raw_type(typeof(part))) for part in (arrays, room))
+    structure = (Reference(raw_type(typeof(part))) for part in (arrays, room))
     return typeof(tile), *structure, number, number, types.CPointer(number)
 
 
@@ -95,8 +95,8 @@ def _call(address: int, tile: Tile, arrays: Array, room: Array, t: float, tolera
 
 
 @njit(cache=True, error_model="numpy")
-def _look(tile, pm, pw, t, tolerance, out):  # type: ignore[no-untyped-def]
-    m, w, size = load(pm), load(pw), load(pm).constraints.size * len(tile)
+def _look(tile, m, w, t, tolerance, out):  # type: ignore[no-untyped-def]
+    size = m.constraints.size * len(tile)
     derive(tile, m.derived, w.z, m.unknowns, m.rows, False)
     derive(tile, m.derived, w.zdot, m.unknowns, m.rows, True)
     kernels.force(tile, m, w, t, w.z, w.zdot, w.a)
@@ -108,22 +108,20 @@ def _look(tile, pm, pw, t, tolerance, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _elastic(tile, pm, pw, t, tolerance, out):  # type: ignore[no-untyped-def]
-    m, w = load(pm), load(pw)
+def _elastic(tile, m, w, t, tolerance, out):  # type: ignore[no-untyped-def]
     kernels.elastic_force(tile, m, w, w.z, w.a, False)
 
 
 @njit(cache=True, error_model="numpy")
-def _accelerate(tile, pm, pw, t, tolerance, out):  # type: ignore[no-untyped-def]
-    m, w = load(pm), load(pw)
+def _accelerate(tile, m, w, t, tolerance, out):  # type: ignore[no-untyped-def]
     kernels.acceleration(tile, m, w, t, w.z, w.zdot, tolerance, w.a)
 
 
 @njit(cache=True, error_model="numpy")
-def _stored(tile, pm, pw, t, tolerance, out):  # type: ignore[no-untyped-def]
-    kernels.energies(tile, load(pm), load(pw))
+def _stored(tile, m, w, t, tolerance, out):  # type: ignore[no-untyped-def]
+    kernels.energies(tile, m, w)
 
 
 @njit(cache=True, error_model="numpy")
-def _remember(tile, pm, pw, t, tolerance, out):  # type: ignore[no-untyped-def]
-    dynamics.remember(tile, load(pm), load(pw))
+def _remember(tile, m, w, t, tolerance, out):  # type: ignore[no-untyped-def]
+    dynamics.remember(tile, m, w)

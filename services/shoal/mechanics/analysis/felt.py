@@ -9,9 +9,9 @@ import numpy as np
 
 from shoal.mechanics import plane
 from shoal.mechanics import rotation as turns_of
-from shoal.mechanics.affine import Affine
+from shoal.mechanics.affine import Affine, points
 from shoal.mechanics.analysis import triads
-from shoal.mechanics.analysis.evaluate import Evaluator, points
+from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.assembly.build import build
 from shoal.mechanics.assembly.groups import place_of
 from shoal.mechanics.frames import BeamFrame, Frame, PointFrame
@@ -129,16 +129,16 @@ def lanes_of(states: States, times: Array, lanes: list[int]) -> Iterator[Felt]:
     if model.slowed:  # what moves more slowly than it would is felt as it would move
         model = build(model.stated, model.lanes, float(times[-1]))
     for lane in lanes:
-        yield _felt(Evaluator(model, lane), states, times, lane, lane)
+        yield _quantities(Evaluator(model, lane), states, times, lane, lane)
 
 
 def lane_of(states: States, times: Array, scene: Scene, values: Mapping[str, Array], lane: int) -> Felt:
     """A lane of a motion whose states are known, on a model of its own. Raises InputError."""
     one = scene.with_values({path: float(numbers[lane]) for path, numbers in values.items()})
-    return _felt(Evaluator.of(one, horizon=float(times[-1])), states, times, lane, 0)
+    return _quantities(Evaluator.of(one, horizon=float(times[-1])), states, times, lane, 0)
 
 
-def _felt(evaluator: Evaluator, states: States, times: Array, lane: int, of_model: int) -> Felt:
+def _quantities(evaluator: Evaluator, states: States, times: Array, lane: int, of_model: int) -> Felt:
     q, v = states.q[..., lane], states.v[..., lane]
     return Felt(evaluator, times, q, v, lambda: _joined(evaluator, times, q, v, of_model), of_model)
 

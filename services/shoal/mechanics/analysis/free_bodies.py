@@ -13,7 +13,8 @@ import scipy.sparse
 
 from shoal.mechanics import plane
 from shoal.mechanics import rotation as turns
-from shoal.mechanics.analysis.evaluate import Evaluator, points
+from shoal.mechanics.affine import points
+from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.assembly.build import build
 from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.assembly.placement import place

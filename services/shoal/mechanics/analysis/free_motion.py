@@ -12,8 +12,7 @@ import numpy as np
 
 from shoal.mechanics import plane
 from shoal.mechanics import rotation as turns
-from shoal.mechanics.affine import Affine
-from shoal.mechanics.analysis.evaluate import points
+from shoal.mechanics.affine import Affine, points
 from shoal.mechanics.analysis.free_bodies import FreeBodies
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
 from shoal.mechanics.assembly.space.sections import image

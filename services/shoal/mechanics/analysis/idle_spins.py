@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 
 from shoal.mechanics import plane
-from shoal.mechanics.affine import Affine
+from shoal.mechanics.affine import Affine, points
 from shoal.mechanics.analysis.balance import Balance
-from shoal.mechanics.analysis.evaluate import points
 from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.frames import BeamFrame, RigidFrame
 from shoal.mechanics.numerics.tile import Array

@@ -1,9 +1,8 @@
-"""Forces and torques in every joint, from the balance of every body taken by itself.
+"""Joint reactions: forces and torques in every joint by the balance of free bodies (Newton-Euler equations).
 
-For each free body M a = Q + (what its joints exert), with unknown forces that do work in no displacement the joint
-allows. All balances together are solved by least squares. Where joints hold more than they need to (redundant
-constraints), the solution of least norm is reported, torques counted as forces at the machine's size as lever, and
-the joints whose forces are not unique are named.
+For each free body M a = Q + R, with the reactions R of its joints as unknowns, which do no work in displacements that
+the joints allow. All balances together are solved by least squares. With redundant constraints the solution of least
+norm is reported, torques over the machine's size as forces, and the joints whose forces are not unique are named.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ from shoal.mechanics.analysis.free_bodies import FreeBodies
 from shoal.mechanics.analysis.free_motion import FreeMotion
 from shoal.mechanics.analysis.freedom import Metric
 from shoal.mechanics.analysis.joint_forces import Component, components, displacements, friction, work
-from shoal.mechanics.analysis.singular import SHARE, beside
+from shoal.mechanics.analysis.singular import SHARE, nearby_freedom
 from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
@@ -38,10 +37,9 @@ class JointReaction:
     """Reaction of a joint on its second body (on its first: the opposite).
 
     at: where [m]; force [N] and torque [N m] (counter-clockwise, in space a vector), friction included; components:
-    each unknown of the joint by name (fx, fy, torque, normal, axial, coupled, ...) with its value; unique: whether none
-    of them could be different with the same motion. force_error [N], torque_error [N m]: how far other runs are away
-    (`reactions_verified`): with other steps, more elements and what slender rods leave out, all together; None where
-    there was none.
+    each unknown of the joint by name (fx, fy, torque, normal, axial, coupled, ...) with its value; unique: whether the
+    motion determines them all. force_error [N], torque_error [N m]: estimated by other runs (`reactions_verified`), the
+    sum of the errors of steps, mesh and the theory of slender rods; None where not estimated.
     """
 
     joint: str
@@ -59,10 +57,10 @@ class JointReaction:
 class Reactions:
     """Reactions at one state.
 
-    redundancy: how many self-stresses are possible. constraints: those of the model that depend on others, at a
-    neighbouring state as well. unbalanced: what no joint can balance, relative to all forces. scale: size of all forces
-    on the bodies [N], torques by the machine's size. settled: whether the forces agree with those of another run, as
-    far as there was one (`reactions_verified`); message: what of that is to be known. errors: of the forces at all
+    redundancy: number of independent self-stresses. constraints: those of the model that depend on others, at a
+    neighbouring state as well. unbalanced: residual of the balances, relative to all forces. scale: size of all forces
+    on the bodies [N], torques by the machine's size. settled: whether the forces agree with those of another run,
+    if there was one (`reactions_verified`); message: why they do not. errors: of the forces at all
     times [N], by source, the largest of all joints.
     """
 
@@ -107,8 +105,8 @@ class Reactions:
         }
 
 
-def told(found: list[Reactions]) -> dict[str, Any]:
-    """Plain data of reactions at some times, with the first status that is not ok."""
+def to_json(found: list[Reactions]) -> dict[str, Any]:
+    """Return plain data of reactions at some times, with the first status that is not ok."""
     worst = next((one for one in found if not one.ok), found[0])
     message = "the bodies are not in balance" if worst.status == "unbalanced" else worst.message
     return {"status": worst.status, "message": message, "reactions": [one.to_json() for one in found]}
@@ -259,7 +257,7 @@ def _sharing(evaluator: Evaluator, q: Array, t: float) -> Array:
     freedom = metric.freedom(evaluator.at(q, t=t).jacobian)
     if freedom.dependent.shape[1] == 0:
         return none
-    near = beside(evaluator, metric, freedom, q, t)
+    near = nearby_freedom(evaluator, metric, freedom, q, t)
     return np.asarray(np.max(np.abs(near.dependent), axis=1, initial=0.0))
 
 

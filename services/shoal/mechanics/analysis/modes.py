@@ -16,12 +16,13 @@ import numpy.typing as npt
 from shoal.arguments import check, one_of
 from shoal.error_budget import ErrorBudget
 from shoal.errors import ComputationError, InputError
+from shoal.mechanics.affine import points
 from shoal.mechanics.analysis import left_out
 from shoal.mechanics.analysis.at_rest import at_start
 from shoal.mechanics.analysis.balance import BALANCED, Balance
 from shoal.mechanics.analysis.damped import small
 from shoal.mechanics.analysis.equilibrium import Equilibrium
-from shoal.mechanics.analysis.evaluate import Evaluator, points
+from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.analysis.going_on import as_stated
 from shoal.mechanics.analysis.singular import crossing
 from shoal.mechanics.analysis.small_motions import hides, pull
@@ -95,7 +96,7 @@ class Mode:
 
     @property
     def kind(self) -> str:
-        """Return oscillating, creeping back, free (nothing pulls back), untold (free or indeterminate), unstable."""
+        """Return the kind of motion; that of a mode whose restoring force round-off hides is indeterminate."""
         if self.eigenvalue.real > 1e-9 * abs(self.eigenvalue):
             return "unstable"
         if not self.eigenvalue:
@@ -152,7 +153,7 @@ class Modes:
     def verdict(self) -> tuple[str, str]:
         """Return the status and why it is not ok.
 
-        The status is ok, unbalanced, moving, unstable, cannot-be-told, coarse-mesh or beyond-theory.
+        Every status but ok has a reason, which names the modes that are concerned.
         """
         kinds = [mode.kind for mode in self.modes]
         coarse = [number for number, error in enumerate(self.mesh_errors, 1) if error > COARSE]

@@ -21,7 +21,7 @@ from shoal.mechanics.stability import step_limit
 from shoal.scene import Scene
 
 
-class State(NamedTuple):
+class MotionState(NamedTuple):
     """Coordinates, rates and accelerations (unknowns,) at a time [s], and the turns of angle forces (forces,)."""
 
     time: float
@@ -42,7 +42,7 @@ def reactions(scene: Scene, times: Sequence[float] = (0.0,)) -> list[Reactions]:
     return result
 
 
-def states(scene: Scene, times: Sequence[float]) -> tuple[Evaluator, list[State]]:
+def states(scene: Scene, times: Sequence[float]) -> tuple[Evaluator, list[MotionState]]:
     """States at times >= 0 [s], each reached from the start by whole steps no longer than the scene's.
 
     Raises InputError if the scene cannot be modelled, ComputationError if the motion cannot be believed (`verdict`).
@@ -65,5 +65,5 @@ def states(scene: Scene, times: Sequence[float]) -> tuple[Evaluator, list[State]
             raise ComputationError(f"{scene.name}: the motion up to {time:g} s is rejected ({status}): {reason}")
         q, v = run.states.q[0, :, 0], run.states.v[0, :, 0]
         evaluator.turns = turns = run.end.turns if isinstance(run.end, Ended) else initial
-        found.append(State(time, q, v, evaluator.acceleration(q, v, time), turns))
+        found.append(MotionState(time, q, v, evaluator.acceleration(q, v, time), turns))
     return evaluator, found

@@ -26,7 +26,7 @@ from shoal.scene import Scene
 
 SHARE = 0.05
 """Of the largest force in the joints at these times: errors beyond it are not believed."""
-ROUND_OFF = 1e-6
+CANCELLED = 1e-6
 """Of all forces on the bodies, which may cancel in the joints: errors below it are none."""
 _TIGHT = 1e-8
 """Runs of adaptive integrators with tolerances below this are held against looser ones first, which cost less."""
@@ -47,7 +47,7 @@ def verified(scene: Scene, times: Sequence[float]) -> list[Reactions]:
     def run(source: str, other: Scene) -> list[Reactions]:
         # Elements of half the length need half the step.
         shorter = {"solver.step": 0.5 * scene.solver.step} if source == "mesh" else {}
-        return _told(stated, reactions(other.with_values(shorter), times))
+        return _with_differences(stated, reactions(other.with_values(shorter), times))
 
     for source, away in second_runs(scene, run, exact=False).items():
         if away is None:
@@ -80,7 +80,7 @@ def _in_time(stated: list[Reactions], scene: Scene, times: Sequence[float]) -> l
     """With their errors in time, on the mesh as stated."""
     runs = [stated]
     if not any(times):
-        return _told(runs[0], runs[0])
+        return _with_differences(runs[0], runs[0])
     lever, off, why = span(scene), np.inf, ""
     for settings in _others(scene):
         try:
@@ -89,14 +89,14 @@ def _in_time(stated: list[Reactions], scene: Scene, times: Sequence[float]) -> l
             why = why or str(error)
             continue
         if _apart(runs[0], another, lever) <= SHARE:
-            return _told(runs[0], another)
+            return _with_differences(runs[0], another)
         off = min(off, _apart(runs[0], another, lever))
         if any(_apart(one, another, lever) <= SHARE for one in runs[1:]):
             nearest = min(runs[1:], key=lambda one: _apart(one, another, lever))
             message = f"the run as stated is off by about {off:.0%} of the largest force; told are those with "
             name, tolerance = settings["solver.integrator"], settings["solver.relative_tolerance"]
             message += f"solver.integrator={name}, solver.relative_tolerance={tolerance:g}"
-            return _told(another, nearest, message)
+            return _with_differences(another, nearest, message)
         runs.append(another)
     if len(runs) == 1:
         return [replace(one, settled=False, message=f"errors of forces not estimated: {why}") for one in runs[0]]
@@ -104,7 +104,7 @@ def _in_time(stated: list[Reactions], scene: Scene, times: Sequence[float]) -> l
         f"forces are off by about {off:.0%} of the largest: use a smaller solver.step, or solver.integrator=dop853 "
         "with a smaller solver.relative_tolerance, or earlier times if the motion is chaotic"
     )
-    return [replace(one, settled=False) for one in _told(runs[0], runs[-1], advice)]
+    return [replace(one, settled=False) for one in _with_differences(runs[0], runs[-1], advice)]
 
 
 def _others(scene: Scene) -> Iterator[dict[str, Any]]:
@@ -133,8 +133,8 @@ def _others(scene: Scene) -> Iterator[dict[str, Any]]:
             }
 
 
-def _told(found: list[Reactions], other: list[Reactions], message: str = "") -> list[Reactions]:
-    """With the differences of another run as errors."""
+def _with_differences(found: list[Reactions], other: list[Reactions], message: str = "") -> list[Reactions]:
+    """Return reactions whose errors are their differences from those of another run."""
     told = []
     for one, two in zip(found, other, strict=True):
         joints = {}
@@ -152,7 +152,7 @@ def _apart(found: list[Reactions], other: list[Reactions], lever: float) -> floa
     """The largest error over the largest force at these times, torques counted at a lever [m]; nan if one is none."""
     errors = [
         max(joint.force_error or 0.0, (joint.torque_error or 0.0) / lever)
-        for one in _told(found, other)
+        for one in _with_differences(found, other)
         for joint in one.joints.values()
     ]
     sizes = [
@@ -160,5 +160,5 @@ def _apart(found: list[Reactions], other: list[Reactions], lever: float) -> floa
         for one in other
         for joint in one.joints.values()
     ]
-    error, floor = max(errors, default=0.0), ROUND_OFF * max(one.scale for one in other)
+    error, floor = max(errors, default=0.0), CANCELLED * max(one.scale for one in other)
     return 0.0 if error <= floor else error / max(sizes)

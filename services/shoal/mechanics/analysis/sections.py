@@ -24,7 +24,7 @@ from shoal.scene.dimensions import padded
 from shoal.scene.joints import places, sides
 
 
-class Sections(NamedTuple):
+class EndForces(NamedTuple):
     """Section forces at both ends of every element of a rod, in order, (2 elements,) each.
 
     s: arc length [m]. normal [N]: tension is positive. shear [N]: of the part beyond on the part before, positive
@@ -63,7 +63,7 @@ class SpatialSections(NamedTuple):
 
 def sections(
     evaluator: Evaluator, q: Array, v: Array, a: Array, t: float, rod: str, *, bodies: FreeBodies | None = None
-) -> Sections | SpatialSections:
+) -> EndForces | SpatialSections:
     """Section forces of a flexible rod at a state (coordinates, rates, accelerations). Raises InputError."""
     scene = evaluator.model.scene
     body = scene.bodies.get(rod)
@@ -106,7 +106,7 @@ def sections(
     found = SpatialSections(*(np.array(one) for one in (arcs, tangents, forces, moments)))
     if scene.dimensions != plane.DIMENSIONS:
         return found
-    return Sections(found.s, found.normal, plane.cross(found.tangent.T, found.force.T), found.moment)
+    return EndForces(found.s, found.normal, plane.cross(found.tangent.T, found.force.T), found.moment)
 
 
 def _interrupted(scene: Scene, name: str, rod: Rod) -> set[int]:

@@ -9,16 +9,16 @@ import numpy as np
 from shoal.errors import InputError
 from shoal.mechanics.analysis.felt import Felt
 from shoal.mechanics.analysis.free_bodies import FreeBodies
-from shoal.mechanics.analysis.sections import Sections, SpatialSections, sections
+from shoal.mechanics.analysis.sections import EndForces, SpatialSections, sections
 from shoal.mechanics.assembly.groups import place_of
 from shoal.mechanics.numerics.tile import Array
 from shoal.scene import Attachment, Rod
 
 
-class Section(NamedTuple):
+class SectionForces(NamedTuple):
     """Normal force and shear force [N], bending moment and torsional moment [N m], (samples,) each.
 
-    In the plane with the signs of `Sections`, and without torsion; in space shear force and bending moment are sizes.
+    In the plane with the signs of `EndForces`, and without torsion; in space shear force and bending moment are sizes.
     """
 
     normal: Array
@@ -27,7 +27,7 @@ class Section(NamedTuple):
     torsion: Array
 
 
-def section_along(felt: Felt, at: Attachment) -> Section:
+def section_along(felt: Felt, at: Attachment) -> SectionForces:
     """Return the section forces at a point of a rod, at a node just beyond it; the model has one lane.
 
     Between the ends of an element they are interpolated linearly. Raises InputError.
@@ -42,9 +42,9 @@ def section_along(felt: Felt, at: Attachment) -> Section:
     rows = []
     for q, v, a, turns, t in zip(felt.q, felt.v, felt.a, felt.turns, felt.times.tolist(), strict=True):
         felt.evaluator.turns = turns
-        both = _told(sections(felt.evaluator, q, v, a, t, name, bodies=bodies), ends)
+        both = _at_ends(sections(felt.evaluator, q, v, a, t, name, bodies=bodies), ends)
         rows.append((1 - x) * both[:, 0] + x * both[:, 1])
-    found = Section(*np.array(rows).T)
+    found = SectionForces(*np.array(rows).T)
     if np.isnan(found.normal).all():
         raise InputError(
             f"section forces of {name} at {float(place[0]):g} m are not known: a load or a joint acts between the "
@@ -54,9 +54,9 @@ def section_along(felt: Felt, at: Attachment) -> Section:
     return found
 
 
-def _told(found: Sections | SpatialSections, ends: slice) -> Array:
-    """At both ends of an element, (4, 2)."""
-    if isinstance(found, Sections):
+def _at_ends(found: EndForces | SpatialSections, ends: slice) -> Array:
+    """Return normal and shear force, bending and torsional moment at both ends of an element, (4, 2)."""
+    if isinstance(found, EndForces):
         none = np.zeros(2)
         return np.array([found.normal[ends], found.shear[ends], found.moment[ends], none])
     tangent, force, moment = found.tangent[ends], found.force[ends], found.moment[ends]

@@ -1,4 +1,4 @@
-"""Static equilibrium within a tolerance: the mesh is refined until its estimated error is small enough."""
+"""Static equilibrium within a tolerance, by uniform mesh refinement and Richardson extrapolation (`mesh_error`)."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from shoal.scene import Scene
 from shoal.scene.shear import with_shear
 
 DOUBLINGS = 7
-"""So often the elements of all rods are doubled."""
+"""Refinements at most; each doubles the elements of all rods."""
 SAFE = 2.0
-"""By this factor the estimate has to be below the tolerance."""
+"""Safety factor: the tolerance over the estimated error."""
 
 
 def settled(scene: Scene, tolerance: float, time: float = 0.0) -> Equilibrium:
@@ -45,7 +45,10 @@ def settled(scene: Scene, tolerance: float, time: float = 0.0) -> Equilibrium:
 
 
 def _refined(scene: Scene, tolerance: float, time: float, begun: Equilibrium | None = None) -> Equilibrium:
-    """The coarsest mesh that will do, of the scene's own elements. begun: the equilibrium of the scene, if known."""
+    """Return the equilibrium on the coarsest mesh within the tolerance, of the scene's own elements.
+
+    begun: the equilibrium of the scene, if known
+    """
     found, gap = begun or statics(scene, time), np.nan
     for _ in range(DOUBLINGS):
         if (fine := finer(scene)) is None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.analysis.freedom import Freedom, Metric
+from shoal.mechanics.numerics.newton import newton
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
 
@@ -17,23 +18,27 @@ STEPS = (0.05, 0.005, 0.0005)
 """How far beside [of a unit vector, or m; of the size of a smaller machine], less where joints do not close there."""
 CLOSED = 1e-9
 """Joints that gape by less are closed."""
+CORRECTED = 1e-11
+"""Corrections [m] below this are the last: squared, as the next one of Newton's method, they are round-off."""
 SHARE = 1e-6
 """A constraint whose part in what depends on others (of unit size) is less does not."""
 
 
-def beside(evaluator: Evaluator, metric: Metric, freedom: Freedom, q: Array, t: float) -> Freedom:
-    """The tangent space at a state near q, in which it is `freedom`; q itself where nothing can move."""
+def nearby_freedom(evaluator: Evaluator, metric: Metric, freedom: Freedom, q: Array, t: float) -> Freedom:
+    """Return the tangent space at a state near q that satisfies the constraints; `freedom`, at q, if that is zero."""
     if not freedom.basis.shape[1]:
         return freedom
     # A fixed combination of all free directions, long enough to leave a singular position.
     step = freedom.basis @ np.cos(1.0 + np.arange(freedom.basis.shape[1]))
     step *= min(1.0, span(evaluator.model.scene)) / np.max(np.abs(step))
-    for length in STEPS:
-        near = q + length * step
-        for _ in range(20):
-            evaluation = evaluator.at(near, t=t)
-            near = near + metric.freedom(evaluation.jacobian).shift(-evaluation.gap)
+
+    def correct(near: Array) -> tuple[Array, float]:
         evaluation = evaluator.at(near, t=t)
+        back = metric.freedom(evaluation.jacobian).shift(-evaluation.gap)
+        return back, float(np.max(np.abs(back), initial=0.0))
+
+    for length in STEPS:
+        evaluation = evaluator.at(newton(correct, q + length * step, close=CORRECTED).point, t=t)
         if np.max(np.abs(evaluation.gap)) < CLOSED:
             break
     return metric.freedom(evaluation.jacobian)
@@ -43,7 +48,7 @@ def crossing(evaluator: Evaluator, metric: Metric, freedom: Freedom, q: Array, t
     """The constraints that depend on others at q and not beside it, by name; none where q is not singular."""
     if not freedom.dependent.shape[1]:
         return ()
-    near = beside(evaluator, metric, freedom, q, t)
+    near = nearby_freedom(evaluator, metric, freedom, q, t)
     if near.dependent.shape[1] >= freedom.dependent.shape[1]:
         return ()
     parts = np.max(np.abs(freedom.dependent), axis=1)

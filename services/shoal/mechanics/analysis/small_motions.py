@@ -32,7 +32,7 @@ HIDES = 0.1
 """Round-off above this part of the slowest frequency that is told may hide one that matters."""
 
 
-class Tangent(NamedTuple):
+class BoundedMatrix(NamedTuple):
     """A matrix (unknowns, unknowns) and the bound of the round-off in its entries, both sparse."""
 
     matrix: Any
@@ -56,7 +56,7 @@ class Spectrum(NamedTuple):
     levels: Array
 
 
-def spectrum(stiffness: Tangent, basis: Array, mass: Any = None, parts: Array | None = None) -> Spectrum:
+def spectrum(stiffness: BoundedMatrix, basis: Array, mass: Any = None, parts: Array | None = None) -> Spectrum:
     """The spectrum of a symmetric stiffness in a basis Z with Z' M Z = I, (unknowns, n).
 
     mass, parts: M and of each unknown the number of the part of the machine that it belongs to, (unknowns,): places

@@ -15,11 +15,12 @@ import scipy.linalg
 
 from shoal.arguments import check
 from shoal.mechanics import plane
+from shoal.mechanics.affine import points
 from shoal.mechanics.analysis import left_out
-from shoal.mechanics.analysis.balance import BALANCED, FALLS, Balance, Found, View
+from shoal.mechanics.analysis.balance import BALANCED, FALLS, Balance, View
 from shoal.mechanics.analysis.damped import small
 from shoal.mechanics.analysis.equilibrium import Equilibrium, Held
-from shoal.mechanics.analysis.evaluate import Evaluator, points
+from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.analysis.going_on import as_stated
 from shoal.mechanics.analysis.idle_spins import idle_spins
 from shoal.mechanics.analysis.joint_reactions import reactions_of
@@ -29,6 +30,7 @@ from shoal.mechanics.assembly.groups import start_angle
 from shoal.mechanics.ended import named_turns
 from shoal.mechanics.frames import BeamFrame, PointFrame, RigidFrame
 from shoal.mechanics.machine import Machine
+from shoal.mechanics.numerics.newton import Root
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
 from shoal.scene import Attachment, Scene
@@ -99,28 +101,28 @@ class _Search:
         message = ""
         found = self._at(q) or self._loaded(q)
         if (found is None or not found.converged) and not leave_unstable:
-            start = q if found is None else found.q
+            start = q if found is None else found.point
             straight = self._count(self.balance.newton(start))
-            if straight.converged and self._turn(start, straight.q) < TURN:
+            if straight.converged and self._turn(start, straight.point) < TURN:
                 found = straight
         if found is None or not found.converged:
             if found is not None:
                 message = "snapped or buckled on the way; "
-                q = self._nudged(found.q) if has_potential else found.q
+                q = self._nudged(found.point) if has_potential else found.point
             found = self._descended(q)
         for attempt in range(4):
             if not found.converged:
                 break
-            eigenvalues, levels, _ = self._eigen(found.q)
+            eigenvalues, levels, _ = self._eigen(found.point)
             if not (leave_unstable and has_potential) or not np.any(np.real(eigenvalues) < -levels):
                 break
             message = "left an unstable equilibrium; "
-            found = self._descended(found.q + KICK * (1 + attempt) * self._soft(found.q)[0])
+            found = self._descended(found.point + KICK * (1 + attempt) * self._soft(found.point)[0])
         if found.converged:
-            refined = self._count(self.balance.newton(found.q, most=6))
-            if refined.converged and self._turn(found.q, refined.q) < 1e-3:
+            refined = self._count(self.balance.newton(found.point, most=6))
+            if refined.converged and self._turn(found.point, refined.point) < 1e-3:
                 found = refined
-                self._follow(found.q)
+                self._follow(found.point)
         return self._judge(found, message)
 
     def _nudged(self, q: Array) -> Array:
@@ -153,50 +155,51 @@ class _Search:
         along = self.placement.start_of(self.placement.direction(scene, at))[0][:, 0]
         return float(plane.angle(along))
 
-    def _judge(self, found: Found, message: str) -> Equilibrium:
-        eigenvalues, levels, lowest = self._eigen(found.q)
-        view = self.balance.look(found.q)
+    def _judge(self, found: Root[Array], message: str) -> Equilibrium:
+        eigenvalues, levels, lowest = self._eigen(found.point)
+        view = self.balance.look(found.point)
         residual = self.balance.residual(view)
         if not found.converged:
             if found.message == FALLS:
-                moved = found.q - self.evaluator.model.q0[:, 0]
-                return self._ending(found.q, Held.UNHELD, f"nothing holds {self._movers(moved)}; it falls without end")
+                moved = found.point - self.evaluator.model.q0[:, 0]
+                text = f"nothing holds {self._movers(moved)}; it falls without end"
+                return self._ending(found.point, Held.UNHELD, text)
             driving, turns = self._driving(), np.abs(self.wound) / (2 * np.pi)
             if np.max(turns, initial=0.0) > TURNS:
                 name, most = self.owners[int(np.argmax(turns))], np.max(turns)
                 text = f"nothing holds {name} against {driving}; after {most:.0f} turns it goes on turning"
-                return self._ending(found.q, Held.UNHELD, text)
+                return self._ending(found.point, Held.UNHELD, text)
             message += found.message
             if self.evaluator.follows:
                 message += f" under what follows its motion ({driving}); a start nearer to rest may help"
-            return self._ending(found.q, Held.FAILED, message, found)
+            return self._ending(found.point, Held.FAILED, message, found)
         if residual > BALANCED:
             text = f"{message}the forces do not balance, {residual:.1g} of them is left"
-            return self._ending(found.q, Held.FAILED, text, found)
-        growth = self._growth(found.q, view) if self.evaluator.follows else None
+            return self._ending(found.point, Held.FAILED, text, found)
+        growth = self._growth(found.point, view) if self.evaluator.follows else None
         if growth is not None and growth > 0:
             text = f"forces that follow the motion make it grow with exp(t * {growth:.4g}/s)"
-            return self._ending(found.q, Held.UNSTABLE, text, found)
+            return self._ending(found.point, Held.UNSTABLE, text, found)
         complex_pair = np.any(np.abs(np.imag(eigenvalues)) > 1e-9 * np.abs(eigenvalues) + levels)
         if growth is None and complex_pair:
-            return self._ending(found.q, Held.UNSTABLE, "forces that follow the motion make it flutter", found)
+            return self._ending(found.point, Held.UNSTABLE, "forces that follow the motion make it flutter", found)
         if len(eigenvalues) and np.real(eigenvalues[0]) < -levels[0]:
             text = f"unstable: it leaves with exp(t * {np.sqrt(-np.real(eigenvalues[0])):.4g}/s); moves first: "
-            return self._ending(found.q, Held.UNSTABLE, message + text + self._movers(lowest), found)
+            return self._ending(found.point, Held.UNSTABLE, message + text + self._movers(lowest), found)
         loose = np.real(eigenvalues) <= levels
         if np.any(loose) and hides(levels[loose], eigenvalues, pull(self.scene)):
             least = float(np.sqrt(np.max(levels[loose])))
             text = f"{message}round-off hides whether {self._movers(lowest)} is held, by less than {least:.1g} rad/s"
-            return self._ending(found.q, Held.UNTOLD, text, found)
+            return self._ending(found.point, Held.UNTOLD, text, found)
         if np.any(loose):
             text = f"{message}nothing holds {self._movers(lowest)}; it may rest in other places as well"
-            return self._ending(found.q, Held.UNHELD, text, found)
+            return self._ending(found.point, Held.UNHELD, text, found)
         if self.spinning:
             axes = "its axis" if len(self.spinning) == 1 else "their axes"
             message += f"{', '.join(self.spinning)}: free to spin about {axes}, which moves nothing"
-        return self._ending(found.q, Held.OK, message.rstrip("; "), found)
+        return self._ending(found.point, Held.OK, message.rstrip("; "), found)
 
-    def _ending(self, q: Array, status: Held, message: str, found: Found | None = None) -> Equilibrium:
+    def _ending(self, q: Array, status: Held, message: str, found: Root[Array] | None = None) -> Equilibrium:
         view = self.balance.look(q)
         e = view.evaluation
         at = self.marker_points.at(q)
@@ -240,26 +243,26 @@ class _Search:
         self.balance.t = self.time
         return q
 
-    def _at(self, q: Array) -> Found | None:
+    def _at(self, q: Array) -> Root[Array] | None:
         """The stable equilibrium in which the machine is put already, but for a thousandth of a turn."""
         found = self.balance.newton(q)
-        if not found.converged or self._turn(q, found.q) > STILL or not self._firm(found.q, 1.0):
+        if not found.converged or self._turn(q, found.point) > STILL or not self._firm(found.point, 1.0):
             return None
         return self._count(found)
 
-    def _descended(self, q: Array) -> Found:
+    def _descended(self, q: Array) -> Root[Array]:
         """Return the minimum of the potential downhill from q, or the rest position after creeping from q."""
         go = self.balance.creep if self.evaluator.follows else self.balance.descend
         return self._count(go(q, self._turn, self._follow))
 
-    def _loaded(self, q: Array) -> Found | None:
+    def _loaded(self, q: Array) -> Root[Array] | None:
         """Load step by step; None if the unloaded machine has no stiffness that holds it."""
         if not self._firm(q, 0.0):
             return None
         unloaded = self._count(self.balance.newton(q, 0.0))
-        if not unloaded.converged or self._turn(q, unloaded.q) > TURN or not self._firm(unloaded.q, 0.0):
+        if not unloaded.converged or self._turn(q, unloaded.point) > TURN or not self._firm(unloaded.point, 0.0):
             return None
-        q, load, step = unloaded.q, 0.0, 1.0
+        q, load, step = unloaded.point, 0.0, 1.0
         self._follow(q)
         before, before_load = q, 0.0
         correction = unloaded.correction
@@ -267,10 +270,10 @@ class _Search:
             ahead = min(1.0, load + step)
             guess = q + (q - before) * ((ahead - load) / (load - before_load)) if load > before_load else q
             found = self._count(self.balance.newton(guess, ahead))
-            near = self._turn(q, found.q) < TURN and self._way(q, found.q) < WAY
-            if found.converged and near and self._firm(found.q, ahead):
+            near = self._turn(q, found.point) < TURN and self._way(q, found.point) < WAY
+            if found.converged and near and self._firm(found.point, ahead):
                 before, before_load = q, load
-                q, load = found.q, ahead
+                q, load = found.point, ahead
                 correction = found.correction
                 self._follow(q)
                 self.steps += 1
@@ -279,8 +282,8 @@ class _Search:
                 step /= 2.0
                 if step < SMALLEST:
                     text = f"the loads cannot be raised beyond {load:.4g} of their size"
-                    return Found(q, False, found.iterations, correction, text)
-        return Found(q, True, self.iterations, correction)
+                    return Root(q, False, found.iterations, correction, text)
+        return Root(q, True, self.iterations, correction)
 
     def _firm(self, q: Array, load: float) -> bool:
         """Return whether the reduced stiffness pulls every displacement back."""
@@ -317,7 +320,7 @@ class _Search:
             return None
         return float(np.max(small(self.balance, q, view).values.real, initial=0.0))
 
-    def _count(self, found: Found) -> Found:
+    def _count(self, found: Root[Array]) -> Root[Array]:
         self.iterations += found.iterations
         return found
 

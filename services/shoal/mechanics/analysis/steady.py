@@ -24,12 +24,14 @@ import scipy.sparse
 from shoal.errors import ComputationError
 from shoal.mechanics import plane
 from shoal.mechanics import rotation as turns
+from shoal.mechanics.affine import points
 from shoal.mechanics.analysis.balance import BALANCED, CLOSE, STALLED, STRAINED
-from shoal.mechanics.analysis.evaluate import Evaluator, points
+from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.analysis.freedom import Freedom, Metric
-from shoal.mechanics.analysis.small_motions import ROUND, Tangent
+from shoal.mechanics.analysis.small_motions import ROUND, BoundedMatrix
 from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.frames import BeamFrame, ModalFrame, RigidFrame
+from shoal.mechanics.numerics.newton import newton
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
 from shoal.scene import Scene
@@ -218,7 +220,7 @@ class Steady:
         multipliers = freedom.multipliers(force)
         loose = self.evaluator.stiffness(q, t)
         full = self.evaluator.stiffness(q, t, multipliers=multipliers)
-        stiffness = Tangent(full.toarray(), (ROUND * (abs(loose) + abs(full - loose))).toarray())
+        stiffness = BoundedMatrix(full.toarray(), (ROUND * (abs(loose) + abs(full - loose))).toarray())
         damping = self.evaluator.damping(q, v).toarray()
         return Seen(
             evaluation.jacobian.toarray(), freedom, freedom.basis.T @ force, evaluation.gap, stiffness, damping,
@@ -239,18 +241,18 @@ class Steady:
         turned = moved[:n, :n]
         return turned, turned @ self.q + moved[:n, n], turned @ self.v
 
-    def stiffness(self, seen: Seen) -> Tangent:
+    def stiffness(self, seen: Seen) -> BoundedMatrix:
         """Stiffness of small motions in the moving frame, with the centrifugal one and that of forces of rates."""
         inertial = self.evaluator.mass @ self.matrix @ self.matrix
         friction = self._by_rates(seen)
         matrix = seen.stiffness.matrix + inertial - friction
         bound = seen.stiffness.bound + EXACT * (abs(inertial) + abs(friction))
-        return Tangent(np.asarray(matrix), np.asarray(bound))
+        return BoundedMatrix(np.asarray(matrix), np.asarray(bound))
 
-    def gyroscopic(self, seen: Seen) -> Tangent:
+    def gyroscopic(self, seen: Seen) -> BoundedMatrix:
         """Damping and gyroscopic matrix of small motions in the moving frame."""
         coriolis = 2.0 * (self.evaluator.mass @ self.matrix)
-        return Tangent(seen.damping + coriolis, ROUND * abs(seen.damping) + EXACT * abs(coriolis))
+        return BoundedMatrix(seen.damping + coriolis, ROUND * abs(seen.damping) + EXACT * abs(coriolis))
 
     def _by_rates(self, seen: Seen) -> Array:
         """Derivative along the free directions of the forces that the rates X(q) make."""
@@ -276,7 +278,7 @@ class Seen(NamedTuple):
     freedom: Freedom
     unbalanced: Array
     gap: Array
-    stiffness: Tangent
+    stiffness: BoundedMatrix
     damping: Array
     size: float
 
@@ -385,7 +387,7 @@ def _checked(
     weights = _constant(twists, begun, seen, weights, idle)
     found = _steady(begun.scene, begun.evaluator, begun.metric, twists, weights, begun.q, begun.t)
     if seek:
-        sought = _sought(found, twists, size)
+        sought = _near_start(found, twists, size)
         if sought is None:
             raise _refused(begun, twists, v, size)
         found = sought
@@ -496,14 +498,15 @@ def _state(steady: Steady, s: float) -> tuple[Array, Array, Array, float]:
     return q, v, steady.matrix @ v, steady.t + s
 
 
-def _sought(begun: Steady, twists: Twists, size: float) -> Steady | None:
+def _near_start(begun: Steady, twists: Twists, size: float) -> Steady | None:
     """The steady motion of the same field near the start, by Newton's method; None where there is none."""
     mass = sum(float(body.mass) for body in begun.scene.bodies.values())
-    found, unit, last = begun, size * np.sqrt(mass), np.inf
-    for _ in range(MOST):
+    unit = size * np.sqrt(mass)
+
+    def correct(found: Steady) -> tuple[Array, float]:
         seen = found.here()
         if np.linalg.norm(seen.unbalanced) <= ROUND * seen.size and np.max(np.abs(seen.gap), initial=0.0) < CLOSE:
-            return found
+            return np.zeros_like(found.q), 0.0
         scaled = _Scaled(found, seen)
         matrix = scaled.stiffness(found.stiffness(seen).matrix)
         back = seen.freedom.shift(-seen.gap)
@@ -511,17 +514,23 @@ def _sought(begun: Steady, twists: Twists, size: float) -> Steady | None:
         left, sizes, ways = np.linalg.svd(matrix)
         rank = int(np.sum(sizes > LOOSE))
         y = scaled.weight * (ways[:rank].T @ (left[:, :rank].T @ right / sizes[:rank]))
-        q = found.q + back + scaled.modes @ y
-        moved, _ = twists.fastest(q - begun.q, size)
-        if not moved < NEAR * size:
-            return None
-        found = replace(found, q=q, v=found.matrix @ q + found.constant, moved=moved)
-        correction = float(np.linalg.norm(y)) / unit + float(np.max(np.abs(back), initial=0.0))
-        if correction < CLOSE or (correction < STALLED and correction > 0.3 * last):
-            seen = found.here()
-            return found if np.linalg.norm(seen.unbalanced) <= BALANCED * max(seen.size, 1e-300) else None
-        last = correction
-    return None
+        correction = back + scaled.modes @ y
+        is_near = way(found.q + correction) < NEAR * size
+        unmet = float(np.linalg.norm(y)) / unit + float(np.max(np.abs(back), initial=0.0))
+        return correction, unmet if is_near else np.inf
+
+    def way(q: Array) -> float:
+        return float(twists.fastest(q - begun.q, size)[0])
+
+    def move(found: Steady, correction: Array) -> Steady:
+        q = found.q + correction
+        return replace(found, q=q, v=found.matrix @ q + found.constant, moved=way(q))
+
+    found, converged, *_ = newton(correct, begun, close=CLOSE, round_off=STALLED, most=MOST, move=move)
+    if not converged:
+        return None
+    seen = found.here()
+    return found if np.linalg.norm(seen.unbalanced) <= BALANCED * max(seen.size, 1e-300) else None
 
 
 def _compare(found: Steady) -> tuple[float, str]:

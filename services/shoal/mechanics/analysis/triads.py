@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from shoal.mechanics.affine import Affine
-from shoal.mechanics.analysis.evaluate import points
+from shoal.mechanics.affine import Affine, points
 from shoal.mechanics.frames import BeamFrame, RigidFrame
 from shoal.mechanics.numerics.tile import Array
 

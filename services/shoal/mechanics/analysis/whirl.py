@@ -14,9 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from shoal.mechanics import rotation as turns
-from shoal.mechanics.affine import combined
+from shoal.mechanics.affine import combined, points
 from shoal.mechanics.analysis.damped import Complex, roots
-from shoal.mechanics.analysis.evaluate import points
 from shoal.mechanics.analysis.small_motions import parts_of, spectrum
 from shoal.mechanics.analysis.steady import FITS, Steady
 from shoal.mechanics.assembly.coordinates import Placement

@@ -10,11 +10,11 @@ from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.assembly.loads import Loads, naming
 from shoal.mechanics.assembly.masses import Masses
 from shoal.mechanics.assembly.placement import place
+from shoal.mechanics.derived import Rows
 from shoal.mechanics.least import principle
 from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import index, stacked
 from shoal.mechanics.reach import span
-from shoal.mechanics.rows import Rows
 from shoal.mechanics.rubbing import Rubbing
 from shoal.scene import GROUND, Distance, Scene
 

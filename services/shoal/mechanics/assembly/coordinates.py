@@ -11,7 +11,6 @@ from shoal.errors import InputError
 from shoal.mechanics import plane
 from shoal.mechanics.affine import Affine, fixed
 from shoal.mechanics.assembly.groups import JointPoint, is_stiff, kept_rotation, place_of
-from shoal.mechanics.assembly.pose import Pose
 from shoal.mechanics.frames import BeamFrame, Frame
 from shoal.mechanics.joints import Along, Apart, InPlane, Meet, Turned
 from shoal.mechanics.numerics.tile import Array, Flags, Number
@@ -21,6 +20,33 @@ from shoal.scene import GROUND, Attachment, Function, Scene
 
 NO_LENGTH = 1e-9
 """A distance that is none, as a part of the machine's size."""
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Initial position [m] (d, lanes) and directors of a body's frame, with their rates of change [m/s, 1/s].
+
+    directors, turning: one vector for each axis of the body and its rate, (d, d, lanes).
+    """
+
+    position: Array
+    directors: Array
+    velocity: Array
+    turning: Array
+
+    def point(self, place: tuple[Number, ...]) -> Array:
+        """Initial position of a material point."""
+        return self.position + arm(self.directors, place)
+
+    def point_velocity(self, place: tuple[Number, ...]) -> Array:
+        """Initial velocity of a material point."""
+        return self.velocity + arm(self.turning, place)
+
+
+def arm(directors: Array, place: tuple[Number, ...]) -> Array:
+    """The way from a body's origin to a place in its frame [m], (d, lanes)."""
+    total: Array = sum(director * part for director, part in zip(directors, place, strict=True))
+    return total
 
 
 @dataclass

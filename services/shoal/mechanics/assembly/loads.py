@@ -17,12 +17,12 @@ from shoal.mechanics.assembly.groups import start_angle
 from shoal.mechanics.assembly.rods import rod_axis
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
 from shoal.mechanics.assembly.space.hinges import axis_of, turning
+from shoal.mechanics.derived import Rows
 from shoal.mechanics.forces import ANGLE, DISTANCE, PLACE, Forces
 from shoal.mechanics.frames import BeamFrame, ModalFrame, RigidFrame
 from shoal.mechanics.functions import Piecewise
 from shoal.mechanics.numerics.tile import Number, index, stacked
 from shoal.mechanics.reach import span
-from shoal.mechanics.rows import Rows
 from shoal.scene import (
     GROUND,
     Attachment,
@@ -42,7 +42,7 @@ from shoal.scene.dimensions import padded
 from shoal.scene.record import Vector3
 
 
-class Law(NamedTuple):
+class ElementForceLaw(NamedTuple):
     """The force of an element along its measure g, F = -[k x + k3 x^3] - [(c + c2 |g'|) g' + F_c tanh(g'/v_s)] + A.
 
     x = g - g0, A times the element's drive where it has one. Numbers, or one for each lane, in the order in which
@@ -100,7 +100,7 @@ class Loads:
             LOADS[type(load)](self, name, load)
 
     def _friction(self, name: str, joint: Revolute | Slider) -> None:
-        law = Law(damping=joint.friction, coulomb=joint.coulomb, speed=joint.coulomb_speed, drag=joint.drag)
+        law = ElementForceLaw(damping=joint.friction, coulomb=joint.coulomb, speed=joint.coulomb_speed, drag=joint.drag)
         if np.any(joint.share):
             self.rubbing.append((name, len(self.kinds), joint.share))
         if isinstance(joint, Revolute):
@@ -120,7 +120,7 @@ class Loads:
                 both = [np.sum(part[i], axis=0) if i == j else -part[i, j] for part in (stiffness, damping)]
                 if any(np.any(part) for part in both):
                     base, natural = (nowhere, rest) if i == j else (other, rest - other_rest)
-                    law = Law(stiffness=both[0], damping=both[1], natural=natural)
+                    law = ElementForceLaw(stiffness=both[0], damping=both[1], natural=natural)
                     self._measure(name, PLACE, [base, one, frame.directors[0]], law, 0.0)
 
     def _torsion_spring(self, name: str, load: TorsionSpring) -> None:
@@ -130,7 +130,7 @@ class Loads:
         rest = start if load.angle is None else load.angle
         if places:  # which tell no whole turns: straight is pi on either side
             start = start + 2 * np.pi * np.round((rest - start) / (2 * np.pi))
-        law = Law(load.stiffness, load.cubic, load.damping, rest)
+        law = ElementForceLaw(load.stiffness, load.cubic, load.damping, rest)
         if places:
             self._measure(name, ANGLE, ways, law, start, elastic=load.elastic)
         else:
@@ -167,7 +167,7 @@ class Loads:
         if isinstance(self.placement, SpatialPlacement):
             self._turn_body(name, load, self.placement)
             return
-        law = Law(amplitude=1.0)
+        law = ElementForceLaw(amplitude=1.0)
         base = load.reaction or Attachment(body=GROUND, point=(0.0, 0.0))
         self._angle(name, base, load.at, law, load.axis, drive=load.torque)
 
@@ -210,7 +210,7 @@ class Loads:
         name: str,
         kind: int,
         vectors: list[Affine],
-        law: Law,
+        law: ElementForceLaw,
         angle: Number,
         *,
         elastic: Function | None = None,
@@ -240,7 +240,7 @@ class Loads:
         name: str,
         first: Attachment,
         second: Attachment,
-        law: Law,
+        law: ElementForceLaw,
         axis: Vector3,
         *,
         elastic: Function | None = None,
@@ -270,7 +270,7 @@ class Loads:
         if rest is None:
             first, second = (self.placement.start_of(end)[0] for end in ends)
             rest = np.sqrt(sum((second - first) ** 2))
-        law = Law(load.stiffness, load.cubic, load.damping, rest)
+        law = ElementForceLaw(load.stiffness, load.cubic, load.damping, rest)
         self._measure(name, DISTANCE, ends, law, 0.0, elastic=load.elastic)
 
     def _force(self, name: str, load: Force) -> None:

@@ -10,13 +10,13 @@ from shoal.mechanics import plane
 from shoal.mechanics.affine import Affine
 from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.assembly.rods import rod_axis
+from shoal.mechanics.derived import Rows
 from shoal.mechanics.elements import FAMILIES, SPATIAL_FAMILIES
 from shoal.mechanics.elements.families import Collected
 from shoal.mechanics.elements.unstrained import unstrained
 from shoal.mechanics.frames import BeamFrame, ModalFrame, PointFrame, RigidFrame
 from shoal.mechanics.joints import Meet, conditions
 from shoal.mechanics.numerics.tile import Array, Number
-from shoal.mechanics.rows import Rows
 from shoal.scene import GROUND, Body, RigidBody, Rod, Scene
 from shoal.scene.dimensions import padded
 

@@ -6,9 +6,8 @@ import numpy as np
 
 from shoal.mechanics import plane
 from shoal.mechanics.affine import fixed
-from shoal.mechanics.assembly.coordinates import Placement
+from shoal.mechanics.assembly.coordinates import Placement, Pose
 from shoal.mechanics.assembly.groups import JointPoint
-from shoal.mechanics.assembly.pose import Pose
 from shoal.mechanics.frames import ModalFrame
 from shoal.mechanics.modal.modes import modes_of
 from shoal.scene import InitialState, Scene

@@ -12,7 +12,7 @@ import numpy as np
 
 from shoal.mechanics import joints, plane
 from shoal.mechanics.affine import combined, fixed
-from shoal.mechanics.assembly.coordinates import Placement
+from shoal.mechanics.assembly.coordinates import Placement, Pose, arm
 from shoal.mechanics.assembly.groups import (
     JointPoint,
     Orientations,
@@ -21,10 +21,8 @@ from shoal.mechanics.assembly.groups import (
     rotated,
     transposed,
 )
-from shoal.mechanics.assembly.holding import hold
 from shoal.mechanics.assembly.modal import place_modal
-from shoal.mechanics.assembly.order import next_body, place_driver, place_point
-from shoal.mechanics.assembly.pose import Pose, arm
+from shoal.mechanics.assembly.placing import hold, next_body, place_driver, place_point
 from shoal.mechanics.assembly.rods import place_rod, rod_axis
 from shoal.mechanics.assembly.space.start import place_started
 from shoal.mechanics.frames import Place, RigidFrame

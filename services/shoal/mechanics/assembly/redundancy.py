@@ -14,6 +14,7 @@ import numpy as np
 from shoal.mechanics import plane
 from shoal.mechanics import rotation as turns
 from shoal.mechanics.assembly.space.rigid_bodies import SpatialBodies
+from shoal.mechanics.numerics.newton import newton
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
 from shoal.mechanics.start.closure import Closure, Poses, Rows
@@ -30,7 +31,6 @@ ASIDE = 0.02
 """How far [1, rad] the machine is moved to leave a singular position."""
 CLOSED = 1e-9
 """Joints that gape by less, relative to the size of the machine or in rad, are closed."""
-ITERATIONS = 20
 DENSE = 150
 """Up to so many rows all singular values are found."""
 LARGEST = 400
@@ -145,14 +145,19 @@ def _moved_aside(closure: Closure, poses: Poses, rows: Rows, size: float) -> Pos
         return None
     step = free.T @ np.cos(1.0 + np.arange(len(free))) * unit
     total = ASIDE * step / np.max(np.abs(step))
-    near = poses.moved(total.reshape(1, rows.bodies, width))
-    for _ in range(ITERATIONS):
-        found = closure.rows(near)
-        length = np.where(found.angular, 1.0, size)
+    length = np.where(rows.angular, 1.0, size)
+
+    def correct(place: tuple[Poses, Array]) -> tuple[Array, float]:
+        found = closure.rows(place[0])
         gap = found.gap[0] / length
         if np.max(np.abs(gap)) < 1e-14:
-            break
+            return np.zeros_like(total), 0.0
         back = unit * np.linalg.lstsq(found.slope[0] / length[:, None] * unit, -gap, RANK)[0]
-        near, total = near.moved(back.reshape(1, rows.bodies, width)), total + back
+        return back, float(np.max(np.abs(back / unit)))
+
+    def move(place: tuple[Poses, Array], step: Array) -> tuple[Poses, Array]:
+        return place[0].moved(step.reshape(1, rows.bodies, width)), place[1] + step
+
+    (near, way), *_ = newton(correct, move((poses, np.zeros_like(total)), total), close=0.0, move=move)
     closed = np.max(np.abs(closure.rows(near).gap[0] / length)) < CLOSED
-    return near if closed and np.max(np.abs(total)) > 0.25 * ASIDE else None
+    return near if closed and np.max(np.abs(way)) > 0.25 * ASIDE else None

@@ -6,9 +6,8 @@ import numpy as np
 
 from shoal.errors import InputError
 from shoal.mechanics import joints, plane
-from shoal.mechanics.assembly.coordinates import Placement
+from shoal.mechanics.assembly.coordinates import Placement, Pose, arm
 from shoal.mechanics.assembly.groups import JointPoint, kept_rotation, transposed
-from shoal.mechanics.assembly.pose import Pose, arm
 from shoal.mechanics.elements import ELEMENTS
 from shoal.mechanics.frames import BeamFrame, Place, is_on_axis
 from shoal.mechanics.numerics.tile import Array, Number

@@ -32,7 +32,7 @@ def gather(tile: Tile, family: Family, number: int, z: Array, w: Array, first: i
             w[to + 8 * width + lane] = z[y2 + lane] - z[y1 + lane]
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def columns(w, at, a, b, d, x, width, lane):  # type: ignore[no-untyped-def]
     """u, v and m at a point of a configuration whose rows begin at `at`."""
     mx, my = w[at + 8 * width + lane], w[at + 9 * width + lane]

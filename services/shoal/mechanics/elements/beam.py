@@ -8,7 +8,7 @@ stress-free one, whose arc length is s0, the strain energy is 1/2 int EA eps^2 +
 kappa the curvature as a bivector. In the plane it is one number, the rate of turn of the tangent (Gerstmayr and Shabana
 2006, eqs. 15 to 17, for r0 straight), and r0 may be curved: kappa0 is the curvature of r0. In space it is the vector
 r' x r'' over the same; bending has the same stiffness in all directions, twisting costs nothing, and r0 is straight, as
-nothing tells the plane in which it would be bent. Both strains vanish at r = r0 and under rigid motion, for any
+the plane of a stress-free curvature is not defined. Both strains vanish at r = r0 and under rigid motion, for any
 parametrisation of r0. Kelvin-Voigt material: N = EA (eps + eta deps/dt), M = EI (kappa + eta dkappa/dt), in space with
 the rate of the size of kappa (`strain.bend`).
 

@@ -1,6 +1,6 @@
-"""The strains of director rods, and the gradient of their energy; see `director` for the formulas.
+"""Strains of director rods and the gradient of their energy by reverse-mode differentiation; see `director`.
 
-The force is the gradient written out backwards; each step has the name of what it is the derivative by. An element is
+Each adjoint has the name of the variable that it is the derivative by. An element is
 18 numbers, or SIMD vectors: r1, r1', d1, r2, r2', d2. Its strains are torsion, k_y and k_z at both points of Gauss,
 times the length L, and the stretching at three points of Lobatto.
 """
@@ -19,12 +19,12 @@ from shoal.mechanics.numerics.tuples import dot, plus, times
 STRAINS = 9
 AXIAL = np.array([[0.0, 1 / 6], [0.5, 4 / 6], [1.0, 1 / 6]])
 BENDING = np.array([[0.5 - 0.5 / np.sqrt(3), 0.5], [0.5 + 0.5 / np.sqrt(3), 0.5]])
-"""Points and weights."""
+"""Points and weights of Lobatto's and Gauss's rules on (0, 1)."""
 
 
 @njit(error_model="numpy", forceinline=True)
 def _carry(d, t, tm):  # type: ignore[no-untyped-def]
-    """A director carried from t to tm by the smallest rotation, and two factors for the way back."""
+    """Parallel transport of a director from t to tm by the smallest rotation, and two factors for its adjoint."""
     j = reciprocal(1.0 + dot(t, tm))
     v = dot(d, tm) * j
     return plus(plus(d, -v, t), -v, tm), v, j
@@ -32,7 +32,7 @@ def _carry(d, t, tm):  # type: ignore[no-untyped-def]
 
 @njit(error_model="numpy", forceinline=True)
 def _carry_back(m, d, t, tm, v, j):  # type: ignore[no-untyped-def]
-    """Derivatives by d, t and tm of what has the derivative m by the carried director."""
+    """Adjoint of `_carry`: derivatives by d, t and tm of a function with the derivative m by the carried director."""
     s, most = (dot(m, t) + dot(m, tm)) * j, times(-v, m)
     return plus(m, -s, tm), plus(most, s * v, tm), plus(plus(most, -s, d), s * v, t)
 

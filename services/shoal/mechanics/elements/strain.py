@@ -40,7 +40,7 @@ def bend(damped, flat, k, rate, change, relaxed, angle, stiffness, eta, straight
     """The moment over |r'|^2 at a point, its turn, and the power lost; flat: 1/|r'|^2, k: r' ^ L r'', change: its rate.
 
     In space only the rate of the size of the turn is damped: without a frame of the section, a turn whose plane changes
-    cannot be told from a rigid rotation. straight: `STRAIGHT` in the units of the turn.
+    is not distinguished from a rigid rotation. straight: `STRAIGHT` in the units of the turn.
     """
     stiffness = stiffness * relaxed
     turn = times(flat, k)

@@ -106,9 +106,9 @@ def _count_impulse(tile: Tile, m: Arrays, w: Work, h: float) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def anew(scheme: GeneralizedAlpha) -> None:
+def forget(scheme: GeneralizedAlpha) -> None:
     """The auxiliary acceleration begins as the true one."""
     scheme.started[0] = 0.0
 
 
-implement(GeneralizedAlpha, step, FACTS, cubic, anew)
+implement(GeneralizedAlpha, step, FACTS, cubic, forget)

@@ -1,8 +1,9 @@
-"""Predictor of implicit steps: that of the method, or extrapolation of the last steps, whichever was nearer before.
+"""Predictor of implicit steps: that of the method, or extrapolation by backward differences, whichever erred less.
 
-A method's own guess takes fast vibrations of stiff parts for motion, as h^2 times their acceleration is far. The
-coordinates of the last steps q, with their backward differences D q, know them as small as they are: a polynomial of
-degree k through the last ones leads to q + D q + ... + D^k q and misses the next one by D^(k+1) q.
+A method's own predictor overestimates fast vibrations of stiff parts, as h^2 times their acceleration is large. A
+polynomial of degree k through the coordinates q of the last steps extrapolates to q + D q + ... + D^k q with backward
+differences D, and its error is D^(k+1) q (Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I,
+section III.1).
 """
 
 from __future__ import annotations
@@ -19,12 +20,12 @@ from shoal.mechanics.numerics.tile import Array, Tile
 
 DEGREE = 3
 STEP, BEST, SEEN = range(3)
-"""What is remembered: the length of the last step [s], the degree that was best (0: the method's guess), and how many
-steps of that length led here."""
+"""Memory: the length of the last step [s], the degree with the least error (0: the method's predictor), and the number
+of steps of that length in a row."""
 
 
 class Guess(NamedTuple):
-    """Room. memory: see above. last: q, D q, ..., D^3 q, (4 * unknowns, lanes); own: the method's guess of the end."""
+    """Work space. memory: see above. last: q, D q, ..., D^3 q, (4 * unknowns, lanes); own: the method's prediction."""
 
     memory: Array
     last: Array
@@ -32,14 +33,14 @@ class Guess(NamedTuple):
 
 
 def guess_room(model: Model, tile: Tile) -> Guess:
-    """Room for one tile of lanes."""
+    """Return the work space of one tile of lanes."""
     end = model.unknowns * len(tile)
     return Guess(np.zeros(3), np.zeros((DEGREE + 1) * end), np.zeros(end))
 
 
 @njit(cache=True, error_model="numpy")
 def start(tile: Tile, m: Arrays, g: Guess, z: Array, h: float) -> None:
-    """At the beginning of a step of h [s] at z: whether what is remembered led there, in steps of that length."""
+    """Begin a step of h [s] at z: forget the differences unless the last steps had that length and ended at z."""
     end = m.unknowns * len(tile)
     known = g.memory[STEP] == h
     for i in range(end):
@@ -51,7 +52,7 @@ def start(tile: Tile, m: Arrays, g: Guess, z: Array, h: float) -> None:
 
 @njit(cache=True, error_model="numpy")
 def improve(tile: Tile, m: Arrays, g: Guess, z: Array, change: Array) -> None:
-    """Replace the method's guess z by the better one; change: by how much."""
+    """Replace the method's prediction z by that of least error before; change: the difference of the two."""
     end = m.unknowns * len(tile)
     assign(g.own, z, end)
     if g.memory[BEST] > 0.0:
@@ -64,7 +65,7 @@ def improve(tile: Tile, m: Arrays, g: Guess, z: Array, change: Array) -> None:
 
 @njit(cache=True, error_model="numpy")
 def learn(tile: Tile, m: Arrays, g: Guess, z: Array) -> None:
-    """The step ended at z; which guess was nearest?"""
+    """Update the differences by the end z of a step, and choose the degree with the least error there."""
     end = m.unknowns * len(tile)
     nearest, best = 0.0, 0
     for i in range(end):

@@ -90,9 +90,9 @@ def _count_drives(tile: Tile, scheme: ImplicitGauss, m: Arrays, w: Work, t: floa
 
 
 @njit(cache=True, error_model="numpy")
-def anew(scheme: ImplicitGauss) -> None:
+def forget(scheme: ImplicitGauss) -> None:
     """The drives begin with the rates that they have by then."""
     scheme.started[0] = 0.0
 
 
-implement(ImplicitGauss, step, FACTS, cubic, anew)
+implement(ImplicitGauss, step, FACTS, cubic, forget)

@@ -2,7 +2,7 @@
 
 Coordinates and multipliers are corrected together, by [H C_q'; C_q 0] as one sparse factor. It is kept over iterations
 and over steps (modified Newton) and renewed where the changes shrink too slowly. They shrink by a rate theta, so that
-theta/(1 - theta) of the last change is what is left (Hairer and Wanner, Solving Ordinary Differential Equations II,
+theta/(1 - theta) of the last change estimates the error (Hairer and Wanner, Solving Ordinary Differential Equations II,
 section IV.8). Where they grow, the step begins again, with a new factor, then with one for every iteration.
 """
 
@@ -50,11 +50,11 @@ GO_ON, CONVERGED, LOST = range(3)
 class Newton(NamedTuple):
     """Settings and room. tolerance: of a coordinate [m].
 
-    matrix: the factored tangent, (slots, lanes); memory: what is known of it. block: tangents of the elements.
-    residual: the force that is out of balance, then the change of the coordinates, (rows, lanes). multiplier: lambda,
+    matrix: the factored tangent, (slots, lanes); memory: its factors, age and convergence. block: tangents of the
+    elements. residual: the unbalanced force, then the change of the coordinates, (rows, lanes). multiplier: lambda,
     kept from step to step, (constraints, lanes). x: right-hand side in the order of elimination. begin: coordinates,
-    rates, accelerations and multipliers of the first guess. change, left: the largest change of a coordinate and what
-    is left to change, (lanes,). The kernels take it with pointers (`raw`).
+    rates, accelerations and multipliers of the first guess. change, left: the largest change of a coordinate and its
+    estimated error, (lanes,). The kernels take it with pointers (`raw`).
     """
 
     tolerance: float

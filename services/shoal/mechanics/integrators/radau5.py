@@ -372,9 +372,9 @@ def inside(tile: Tile, scheme: Radau5, m: Arrays, w: Work, past: Array, x: float
 
 
 @njit(cache=True, error_model="numpy")
-def anew(scheme: Radau5) -> None:
+def forget(scheme: Radau5) -> None:
     """Forget the polynomial of the last step."""
     scheme.last[0] = 0.0
 
 
-implement(Radau5, step, FACTS, inside, anew)
+implement(Radau5, step, FACTS, inside, forget)

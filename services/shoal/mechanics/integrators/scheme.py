@@ -91,14 +91,14 @@ def averages(scheme: Any) -> bool:
     raise NotImplementedError(type(scheme).__name__)
 
 
-def implement(settings: type, step: Any, facts: Facts, inside: Any = dense.quintic, anew: Any = None) -> None:
-    """Let compiled calls with settings of this type run the kernel `step`, and `inside` for the motion within it.
+def implement(settings: type, step: Any, facts: Facts, inside: Any = dense.quintic, forget: Any = None) -> None:
+    """Register kernels of an integrator by the type of its settings: `step`, and `inside` for the motion within it.
 
-    anew: restarts a scheme that remembers earlier steps. The parameters of the kernels are named as
-    those of `advance`, `interpolate` and `restart`.
+    forget: discards the memory of earlier steps. The parameters of the kernels are named as those of `advance`,
+    `interpolate` and `restart`.
     """
     choose(advance, settings, step, forceinline=True)
     choose(interpolate, settings, inside)
-    choose(restart, settings, anew or (lambda scheme: None))
+    choose(restart, settings, forget or (lambda scheme: None))
     choose(adaptive, settings, (lambda scheme: True) if facts.adaptive else (lambda scheme: False))
     choose(averages, settings, (lambda scheme: True) if facts.mean_power else (lambda scheme: False))

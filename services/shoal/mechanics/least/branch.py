@@ -53,8 +53,8 @@ VELOCITY, ACCELERATION = 1, 2
 def is_real(tile: Tile, m: Arrays, w: GaussWork, s: LaneWork, t: float, v: Array, lane: int, first: int) -> bool:
     """Return whether branches of the motion of one lane cross at the singular position near it; see `crossing`.
 
-    first: rank of the constraints, beyond which s.rows holds what is left of the dependent ones. C is in w.residual.
-    At rest nothing is known of the tangent, and branches are taken to cross.
+    first: rank of the constraints, beyond which s.rows holds the remainders of the dependent ones. C is in w.residual.
+    At rest the tangent is not known, and branches are taken to cross.
     """
     width, n, c = len(tile), m.unknowns, m.constraints
     for number in range(first, c.size):

@@ -1,11 +1,11 @@
-"""Whether branches of the motion cross at a singular position, which third derivatives take for granted.
+"""Test of whether branches of the motion cross at a singular position, as third derivatives of constraints assume.
 
 That is a property of the machine and not of where it is. Near the singular position x_s the combination of constraints
 whose gradient vanishes there is u'C = c + 1/2 (x - x_s)' H (x - x_s), H = u'C_qq. If c is zero, branches cross; if not,
 they are the arms of hyperbolas, and the motion stays on its own, however sharp its turn is. Such a machine is regular
 everywhere, as a four-bar that has not quite the lengths of a parallelogram, and its constraints define its motion.
 
-At a position near x_s the gradient l = H (x - x_s) is what is left of a row that depends on others, at right angles to
+At a position near x_s the gradient l = H (x - x_s) is the remainder of a row that depends on others, at right angles to
 the velocity v. In the plane of both c = -1/2 |l|^4 v'Hv / (v'Hv l'Hl - (v'Hl)^2), as u'C = 0. It is compared with the
 round-off of the constraints. Where both terms of the divisor cancel, the position is beyond what H describes, and the
 larger one counts.

@@ -29,7 +29,7 @@ LITTLE = 1e-13
 """A gap of rates that the next step may remove."""
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def project(
     tile: Tile,
     m: Arrays,

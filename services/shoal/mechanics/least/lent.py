@@ -37,7 +37,7 @@ def take_back_from_lane(
         if orthogonal:
             projection.take_out(rank, s.rows, s.wanted, s.row)
         else:
-            s.weights[:] = 0.0
+            projection.clear(s.weights)
             alternatives.correct(m.method, s.rows, s.weights, s.triangle, s.norms, s.wanted, s.row)
         for i in range(n):
             s.y[i] += s.row[i]

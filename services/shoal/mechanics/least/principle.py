@@ -50,7 +50,7 @@ def state(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array) -> 
     constraints.bias(tile, m.constraints, m.functions, t, v, w.gap)
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def constrain(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array, a: Array, tolerance: float) -> None:
     """Turn the forces Q in `a` into the true acceleration; the multipliers go into w.multiplier.
 
@@ -120,7 +120,7 @@ def constrain(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array,
                 w.power[lane] = branch.power(tile, m, w, s, v, lane, first, rank)
             projection.multipliers(first, s.triangle, s.norms, s.order, s.wanted, s.weights)
         else:
-            s.wanted[:] = 0.0
+            projection.clear(s.wanted)
             alternatives.prepare(m.method, s.rows, s.triangle, s.norms)
             alternatives.correct(m.method, s.rows, s.weights, s.triangle, s.norms, s.wanted, s.y)
             lent.take_back_from_lane(tile, m, w, s, lane, np.int64(0), orthogonal)

@@ -44,6 +44,13 @@ def dot(x: Array, y: Array) -> float:
     return (a + b) + (c + d)
 
 
+@njit(error_model="numpy", forceinline=True)
+def clear(x: Array) -> None:
+    """x = 0, as a loop: Numba compiles any assignment to a slice as the most general one."""
+    for i in range(x.size):
+        x[i] = 0.0
+
+
 @njit(cache=True, error_model="numpy")
 def orthonormalise(rows: Array, triangle: Array, norms: Array, order: Index, tolerance: float) -> int:
     """Replace the leading rows by an orthonormal basis of all of them; returns the rank.
@@ -59,7 +66,8 @@ def orthonormalise(rows: Array, triangle: Array, norms: Array, order: Index, tol
         if norms[k] > 0.0:
             for i in range(n):
                 rows[k, i] /= norms[k]
-    triangle[:, :] = 0.0
+    for k in range(count):
+        clear(triangle[k])
     for k in range(count):
         pivot, longest = k, -1.0
         for j in range(k, count):
@@ -115,7 +123,7 @@ def components(rank: int, triangle: Array, norms: Array, order: Index, target: A
 @njit(cache=True, error_model="numpy")
 def dependence(number: int, rank: int, triangle: Array, norms: Array, order: Index, out: Array) -> None:
     """A combination of rows that vanishes: out[k] * row k, summed, = 0; that of the dependent row order[number]."""
-    out[:] = 0.0
+    clear(out)
     if norms[order[number]] == 0.0:
         out[order[number]] = 1.0
         return
@@ -171,7 +179,7 @@ def confine(rank: int, rows: Array, y: Array, room: Array) -> None:
 @njit(cache=True, error_model="numpy")
 def multipliers(rank: int, triangle: Array, norms: Array, order: Index, change: Array, out: Array) -> None:
     """lambda with sum of lambda * row = -(change along the basis), change: from `move`; zero for dependent rows."""
-    out[:] = 0.0
+    clear(out)
     for k in range(rank - 1, -1, -1):
         total = -change[k]
         for j in range(k + 1, rank):

@@ -11,6 +11,8 @@ where w_i is: w_i = v e - u e_perp.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -20,7 +22,6 @@ from shoal.mechanics import joints
 from shoal.mechanics.joints import Geared, Sum, Turned
 from shoal.mechanics.modal import beams
 from shoal.mechanics.modal.beams import Ends
-from shoal.mechanics.modal.numbers import Modes, Shapes
 from shoal.mechanics.numerics.tile import Array, Number
 from shoal.scene import ModalBody, Rod, Scene
 
@@ -28,14 +29,33 @@ _POINTS = 24
 """Points of Gauss's rule along a rod, and so many more a mode."""
 _NOTHING = 1e-12
 """An integral below this, of the size it could have, is zero."""
+Shapes = Callable[[tuple[Number, ...]], tuple[list[Any], list[Any]]]
 
 
-def modes_of(scene: Scene, name: str) -> Modes:
+@dataclass(frozen=True)
+class ModalIntegrals:
+    """across: how many have a vector of their own; along: how many of a rod stretch it, first evenly.
+
+    moments: Hermitian, (2 + across, 2 + across, lanes), the first two of the frame; stiffness, damping: (modes, modes,
+    lanes), first those across; shapes: place -> complex displacement and slope (that of the body's x direction) of
+    every mode there; length [m]: of a rod.
+    """
+
+    across: int
+    along: int
+    length: Number
+    moments: Array
+    stiffness: Array
+    damping: Array
+    shapes: Shapes
+
+
+def modes_of(scene: Scene, name: str) -> ModalIntegrals:
     """The modes of a modal rod or body."""
     body = scene.bodies[name]
     if isinstance(body, ModalBody):
         stiffness, damping = body.matrix("modal_stiffness"), body.matrix("modal_damping")
-        return Modes(len(body.modes), 0, 1.0, body.moments, stiffness, damping, _shapes_of_body(name, body))
+        return ModalIntegrals(len(body.modes), 0, 1.0, body.moments, stiffness, damping, _shapes_of_body(name, body))
     assert isinstance(body, Rod)
     return _of_rod(body, held(scene, name))
 
@@ -90,7 +110,7 @@ def bent(scene: Scene, name: str, place: tuple[Number, ...]) -> tuple[Number, Nu
     return along, rate, np.angle(way), np.imag(turning / way)
 
 
-def _of_rod(rod: Rod, ends: Ends) -> Modes:
+def _of_rod(rod: Rod, ends: Ends) -> ModalIntegrals:
     """The integrals of the shapes of a uniform beam over a rod, which may be tapered."""
     x, weight = np.polynomial.legendre.leggauss(_POINTS + 8 * (rod.modes + rod.axial_modes))
     x, weight = (x[:, None] + 1) / 2, weight[:, None] / 2
@@ -108,7 +128,7 @@ def _of_rod(rod: Rod, ends: Ends) -> Modes:
     stiffness = _cleaned(stiffness)
     damping = np.asarray(rod.retardation) * stiffness
     shapes = _shapes_of_rod(rod, ends)
-    return Modes(rod.modes, rod.axial_modes, rod.length, _cleaned(moments), stiffness, damping, shapes)
+    return ModalIntegrals(rod.modes, rod.axial_modes, rod.length, _cleaned(moments), stiffness, damping, shapes)
 
 
 def _laned(fields: Any) -> Array:

@@ -36,14 +36,24 @@ class Poses(NamedTuple):
     angles: Array
 
     @classmethod
-    def of(cls, u: Array | Poses) -> Poses:
-        """Return those of numbers in the plane, (lanes, 3 bodies)."""
+    def of(cls, u: Array | Poses, bodies: int) -> Poses:
+        """Return those of numbers, (lanes, numbers): of each body its place and angle, or in space its axes in rows."""
         if isinstance(u, Poses):
             return u
-        each = np.pad(u.reshape(len(u), -1, POSE), ((0, 0), (0, 1), (0, 0)))
-        cosine, sine = np.cos(each[..., 2]), np.sin(each[..., 2])
-        axes = np.stack([np.stack([cosine, -sine], axis=-1), np.stack([sine, cosine], axis=-1)], axis=-2)
-        return cls(each[..., :2], axes, each[..., 2])
+        each = np.pad(u.reshape(len(u), bodies, -1), ((0, 0), (0, 1), (0, 0)))
+        if each.shape[-1] == POSE:
+            cosine, sine = np.cos(each[..., 2]), np.sin(each[..., 2])
+            axes = np.stack([np.stack([cosine, -sine], axis=-1), np.stack([sine, cosine], axis=-1)], axis=-2)
+            return cls(each[..., :2], axes, each[..., 2])
+        each[:, -1, 3:] = np.eye(3).ravel()
+        return cls(each[..., :3], each[..., 3:].reshape(*each.shape[:2], 3, 3), np.zeros(each.shape[:2]))
+
+    @property
+    def numbers(self) -> Array:
+        """The numbers of the bodies, (lanes, numbers)."""
+        d = self.places.shape[-1]
+        turn = self.angles[..., None] if d == 2 else self.axes.reshape(*self.angles.shape, 9)
+        return np.concatenate([self.places, turn], axis=-1)[:, :-1].reshape(len(self.places), -1)
 
     def moved(self, step: Array) -> Poses:
         """Return the poses after small displacements and turns of the bodies, (lanes, bodies, d + turns)."""
@@ -55,6 +65,18 @@ class Poses(NamedTuple):
         rotation = np.moveaxis(turns.of_vector(np.moveaxis(turn, -1, 0).reshape(3, -1)), -1, 0)
         rotation = rotation.reshape(*turn.shape[:-1], 3, 3)[..., :d, :d]
         return Poses(self.places + step[..., :d], rotation @ self.axes, angles)
+
+    def away(self, other: Poses) -> Array:
+        """Return how far each column of the bodies is from that of others, [m, rad], (lanes, columns).
+
+        In space each column of a turn has the angle between both.
+        """
+        turned = (self.angles - other.angles)[..., None]
+        if self.places.shape[-1] == 3:
+            chord = np.linalg.norm(self.axes - other.axes, axis=(-2, -1)) / np.sqrt(8.0)
+            turned = np.repeat(2.0 * np.arcsin(np.minimum(chord, 1.0))[..., None], 3, axis=-1)
+        both = np.concatenate([self.places - other.places, turned], axis=-1)
+        return np.asarray(np.abs(both[:, :-1].reshape(len(both), -1)))
 
 
 @dataclass(frozen=True)
@@ -92,17 +114,17 @@ class Closure:
     """The joints of a scene. begin: poses (lanes, 3 bodies) at which joints without a value of their own hold.
 
     own: whether joints that keep what the start gives them (a weld without an angle, a distance without a length)
-    hold at `begin`, or take any value there is. bodies: that the conditions refer to, by
-    default those of the plane
+    hold at `begin`, or take any value there is. bodies: that the conditions refer to, by default those of the plane.
+    names, angular: of every row its joint, and whether its gap is an angle
     """
 
     def __init__(self, scene: Scene, begin: Array | Poses, own: bool = True, bodies: RigidBodies | None = None) -> None:
-        self.begin, self.own = Poses.of(begin), own
         bodies = RigidBodies(scene) if bodies is None else bodies
         held, marks, d = bodies.terms.held, bodies.marks, scene.dimensions
         self._terms = TermValues(held, d, bodies.lengths, counted=d == 2)
-        self._names, self._bodies = tuple(one.name for one in held), len(bodies.owners)
-        self._angular = np.array([one.lengths == 0 for one in held], dtype=bool)
+        self.names, self._bodies = tuple(one.name for one in held), len(bodies.owners)
+        self.angular = np.array([one.lengths == 0 for one in held], dtype=bool)
+        self.begin, self.own = Poses.of(begin, self._bodies), own
         self._wrapping = bodies.wrapping
         self._of_start, self._kept = list(bodies.of_start), list(bodies.of_start.values())
         is_free = [one is None or one.is_of_start for one in self._kept]
@@ -118,7 +140,7 @@ class Closure:
     def at(self, begin: Array | Poses, own: bool = True) -> Closure:
         """Return the same joints with other poses at which those hold that take their value from the start."""
         other = copy(self)
-        other.begin, other.own, other._at_start = Poses.of(begin), own, None
+        other.begin, other.own, other._at_start = Poses.of(begin, self._bodies), own, None
         return other
 
     def of_lane(self, lane: int) -> Closure:
@@ -142,7 +164,7 @@ class Closure:
 
     def rows(self, u: Array | Poses) -> Rows:
         """All joints at poses."""
-        poses = Poses.of(u)
+        poses = Poses.of(u, self._bodies)
         vectors, turning, rates = self._evaluate(poses)
         gap, slopes = self._terms.at(vectors)
         gap[:, self._of_start] -= self._values_at_start
@@ -162,7 +184,7 @@ class Closure:
                 rate[:, rows] += drift[:, part]
             of_body = bodies >= 0
             parts.append((rows[of_body], bodies[of_body], by_pose[:, part][:, of_body]))
-        return Rows(gap, rate, self._names, self._angular, parts, self._bodies)
+        return Rows(gap, rate, self.names, self.angular, parts, self._bodies)
 
     def _evaluate(self, poses: Poses) -> tuple[Array, Array, Array | None]:
         """The components of all vectors at poses, (lanes, d vectors), and their derivatives, (lanes, vectors, d, ...).

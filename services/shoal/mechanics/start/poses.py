@@ -6,19 +6,22 @@ that are not stated are shaken, a little at first. Many lanes are one batch.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
+from shoal.mechanics import rotation as turns
 from shoal.mechanics.joints import of_scene
-from shoal.mechanics.numerics.tile import Array, Flags
+from shoal.mechanics.numerics.levenberg_marquardt import levenberg_marquardt
+from shoal.mechanics.numerics.tile import Array, Flags, Index
 from shoal.mechanics.reach import extents, span
-from shoal.mechanics.start.closure import Closure
+from shoal.mechanics.start.closure import Closure, Poses
+from shoal.mechanics.start.rigid_bodies import RigidBodies
 from shoal.mechanics.start.walk import Walk, guessed_angles
-from shoal.scene import Scene
-from shoal.scene.initial import Quantity
+from shoal.scene import PointMass, Scene
+from shoal.scene.initial import POSES, Quantity
 
 CLOSED = 1e-11
 """A joint that gapes by less, relative to the size of the machine or in rad, is closed."""
@@ -32,20 +35,30 @@ FEWER = 8
 """While a contradiction is narrowed down, in half of the iterations."""
 _SHAKEN = 1200
 """Poses of all guesses of one machine together: to shake a long chain at random hardly ever helps."""
-_PATIENCE, _STANDS = 8, 0.99
-"""In so many steps a search that does not stand still lowers its gaps to less than this part."""
+GAIN = 1e-6
+"""A step that promises to lower the squared gaps by less than this part ends a search: nothing near closes."""
+SMALLEST = 1e-13
+"""Of the damping, so that equations of rows that depend on others can be solved."""
 DEPENDENT = 1e-6
 """Part of a pose that the joints leave free, below which they determine it."""
+TURNS = {2: (2,), 3: (3, 4, 5)}
+"""Columns of a body that are turns, by the number of dimensions; those before are displacements."""
+PLACES = ("position", "velocity")
 
 
 @dataclass(frozen=True)
 class Statement:
-    """A stated quantity of a body: columns of the poses or rates, and values (lanes, columns). firm: not a guess."""
+    """A stated quantity of a body: columns of displacements or rates, and values as stated (lanes, components).
+
+    numbers: of the poses, which are `put` (lanes, numbers). firm: not a guess
+    """
 
     body: str
     quantity: Quantity
     columns: tuple[int, ...]
     values: Array
+    numbers: tuple[int, ...]
+    put: Array
     firm: bool
 
     @property
@@ -55,7 +68,7 @@ class Statement:
 
 
 class Placed(NamedTuple):
-    """Poses (lanes, 3 bodies), and whether they close the joints and keep the stated values, (lanes,)."""
+    """Poses (lanes, numbers), and whether they close the joints and keep the stated values, (lanes,)."""
 
     poses: Array
     ok: Flags
@@ -63,81 +76,99 @@ class Placed(NamedTuple):
 
 def stated(scene: Scene, lanes: int, quantities: tuple[Quantity, ...]) -> list[Statement]:
     """Return the statements of these quantities: first the firm ones, then guesses, each in the order of the scene."""
-    found = []
-    number = {name: 3 * k for k, name in enumerate(scene.bodies)}
+    found, d = [], scene.dimensions
+    width, size = (3, 3) if d == 2 else (6, 12)
+    number = {name: k for k, name in enumerate(scene.bodies)}
     for name, start in scene.initial.items():
         for quantity in quantities:
             value = getattr(start, quantity)
-            if value is None:
+            if value is None or (d == 3 and quantity not in PLACES and isinstance(scene.bodies[name], PointMass)):
                 continue
-            turning = quantity in ("angle", "rate")
-            columns = (number[name] + 2,) if turning else (number[name], number[name] + 1)
-            parts = (value,) if turning else value
-            values = np.stack([np.broadcast_to(np.asarray(part, dtype=float), lanes) for part in parts], 1)
-            found.append(Statement(name, quantity, columns, values, quantity not in start.guess))
+            parts = value if isinstance(value, tuple) else (value,)
+            columns: Iterable[int] = TURNS[d]
+            if quantity in PLACES:
+                parts, columns = (*parts, 0.0)[:d], range(d)
+            put = values = np.stack([np.broadcast_to(np.asarray(part, dtype=float), lanes) for part in parts], 1)
+            numbers = columns
+            if d == 3 and quantity in ("angle", "rotation"):
+                turn = turns.about_z(values[:, 0]) if quantity == "angle" else turns.of_vector(values.T)
+                numbers, put = range(3, size), np.moveaxis(turn, -1, 0).reshape(lanes, 9)
+            own, its = (tuple(k + n * number[name] for k in some) for n, some in ((width, columns), (size, numbers)))
+            found.append(Statement(name, quantity, own, values, its, put, quantity not in start.guess))
     return sorted(found, key=lambda one: not one.firm)
 
 
 class Assembly:
-    """The search for the poses of one scene, of one or many lanes."""
+    """The search for the poses of one scene, of one or many lanes.
 
-    def __init__(self, scene: Scene, lanes: int) -> None:
+    bodies: rigid bodies that the joints refer to; begin: poses of the first guess, by default those of the walk along
+    the joints of the plane
+    """
+
+    def __init__(self, scene: Scene, lanes: int, bodies: RigidBodies | None = None, begin: Poses | None = None) -> None:
         self.scene, self.lanes = scene, lanes
         self.walk = Walk(scene)
-        self.statements = stated(scene, lanes, ("angle", "position"))
-        self.angles, self.rates = guessed_angles(scene, lanes)
-        self.closure = Closure(scene, np.zeros((lanes, 3 * len(scene.bodies))))
-        self.guess = self._guess(0, np.ones(self.angles.shape, dtype=bool))
+        self.statements = stated(scene, lanes, POSES)
+        self.turns = TURNS[scene.dimensions]
+        self._begin = begin
+        self.angles, self.rates = guessed_angles(scene, lanes) if begin is None else (np.zeros((lanes, 0)),) * 2
+        self._columns = np.zeros((lanes, len(scene.bodies) * (scene.dimensions + len(self.turns))), dtype=bool)
+        self.guess = self._guess(0, self._columns)
         self.size = span(scene)
         arms = np.array([max(float(np.max(arm)), 1e-3 * self.size) for arm in extents(scene).values()])
-        self.give = np.stack([np.ones_like(arms), np.ones_like(arms), arms**-2], 1).ravel()
-        """Inverse of the metric in which displacements are measured, (3 bodies,)."""
-        self.closure = self.closure.at(self.guess)
+        one = [np.ones_like(arms)] * scene.dimensions
+        self.give = np.stack([*one, *[arms**-2] * len(self.turns)], 1).ravel()
+        """Inverse of the metric in which displacements are measured, (columns,)."""
+        self.units = np.stack([*[self.size * part for part in one], *one[:1] * len(self.turns)], 1).ravel()
+        """Of the columns: the size of the machine [m] and 1 rad."""
+        self.closure = Closure(scene, self.guess, bodies=bodies)
         self._sought: dict[tuple[bytes, bytes], Placed] = {}
         """What was looked for before: where it is not there, the reason is sought by the same steps."""
         self.effort = 0
         """Gaps that were looked at while closing joints, those of many lanes at once counted once."""
 
     def _guess(self, attempt: int, keep: Flags) -> Array:
-        """Poses from the stated angles; later attempts shake those not in `keep`, (lanes, bodies)."""
-        angles = self.angles
+        """Poses of the first guess; later attempts shake the turns that are not in `keep`, (lanes, columns)."""
+        count = len(self.scene.bodies)
+        shaken = np.zeros((count, len(self.turns)))
         if attempt:
             rng = np.random.default_rng(attempt)
-            shaken = min(0.3 * attempt, np.pi) * rng.uniform(-1.0, 1.0, angles.shape[1])
-            angles = np.where(keep, angles, angles + shaken)
-        return self.walk.poses(angles, self.rates)[0]
+            shaken = min(0.3 * attempt, np.pi) * rng.uniform(-1.0, 1.0, shaken.shape)
+        turn = shaken * ~keep.reshape(len(keep), count, -1)[..., self.turns]
+        if self._begin is None:
+            return self.walk.poses(self.angles + turn[..., 0], self.rates)[0]
+        return self._begin.moved(np.pad(turn, ((0, 0), (0, 0), (len(self.turns), 0)))).numbers
 
-    def held(self, chosen: list[Statement]) -> tuple[Flags, Array]:
-        """Return flags of the poses that these statements fix, and their values; each (lanes, 3 bodies)."""
-        fixed, values = np.zeros(self.guess.shape, dtype=bool), np.zeros(self.guess.shape)
+    def held(self, chosen: Iterable[Statement], near: Array | None = None) -> tuple[Flags, Array]:
+        """Return flags of the columns that statements fix, (lanes, columns), and poses with them, else near others."""
+        fixed, poses = self._columns.copy(), (self.guess if near is None else near).copy()
         for one in chosen:
-            fixed[:, one.columns], values[:, one.columns] = True, one.values
-        return fixed, values
+            fixed[:, one.columns], poses[:, one.numbers] = True, one.put
+        return fixed, poses
 
     def run(self) -> Placed:
         """Return poses with all statements, or with as many as the joints allow."""
-        fixed, values = self.held(self.statements)
-        found = self.seek(fixed, values)
+        found = self.seek(self.statements)
         if np.all(found.ok):
             return found
         loose = self._in_order()
         return Placed(np.where(found.ok[:, None], found.poses, loose.poses), found.ok | loose.ok)
 
-    def seek(self, fixed: Flags, values: Array, near: Array | None = None) -> Placed:
-        """Poses with some held, from one guess after another (or near one)."""
-        begun = np.where(fixed, values, self.guess if near is None else near)
-        asked = (fixed.tobytes(), begun.tobytes())
+    def seek(self, chosen: Sequence[Statement], near: Array | None = None) -> Placed:
+        """Poses with some statements held, from one guess after another (or near one)."""
+        fixed, begin = self.held(chosen, near)
+        asked = fixed.tobytes(), begin.tobytes()
         if asked not in self._sought:
-            self._sought[asked] = self._seek(fixed, values, near, self._attempts if self.lanes == 1 else FEW)
+            self._sought[asked] = self._seek(chosen, near, self._attempts if self.lanes == 1 else FEW)
         return self._sought[asked]
 
     def closes(self, chosen: list[Statement], joints: Sequence[str]) -> bool:
         """Return whether these joints of one machine close with these statements held: a few guesses, all at once."""
-        fixed, values = self.held(chosen)
-        begin = np.concatenate([self._guess(number, fixed[:, 2::3]) for number in range(FEWER)])
+        fixed, first = self.held(chosen)
+        begin = self.held(chosen, np.concatenate([self._guess(number, fixed) for number in range(FEWER)]))[1]
         for own in (True, False) if self._own else (True,):
-            closure = self.closure.at(np.where(fixed, values, self.guess), own)
-            rows = closure.rows(self.close(closure, np.where(fixed, values, begin), fixed, most=ITERATIONS // 2)[0])
+            closure = self.closure.at(first, own)
+            rows = closure.rows(self.close(closure, begin, fixed, most=ITERATIONS // 2)[0])
             gap = np.abs(rows.gap / np.where(rows.angular, 1.0, self.size))[:, np.isin(rows.names, joints)]
             if np.any(np.max(gap, axis=1, initial=0.0) <= CLOSED):
                 return True
@@ -145,22 +176,23 @@ class Assembly:
 
     @property
     def _attempts(self) -> int:
-        return int(np.clip(_SHAKEN // max(self.guess.shape[1], 1), FEW, ATTEMPTS))
+        return int(np.clip(_SHAKEN // max(self._columns.shape[1], 1), FEW, ATTEMPTS))
 
-    def _seek(self, fixed: Flags, values: Array, near: Array | None, most: int) -> Placed:
-        best, ok = np.where(fixed, values, self.guess), np.zeros(self.lanes, dtype=bool)
+    def _seek(self, chosen: Sequence[Statement], near: Array | None, most: int) -> Placed:
+        fixed, best = self.held(chosen)
+        first, ok = best, np.zeros(self.lanes, dtype=bool)
         for own in (True, False) if self._own else (True,):
-            closure = self.closure.at(np.where(fixed, values, self.guess), own)
+            closure = self.closure.at(first, own)
             for attempt in range(most):
                 if attempt == 1 and self.lanes == 1:
                     # The later guesses at once, as lanes: they take as long as two, and the first that closes is taken.
-                    others = [self._guess(number, fixed[:, 2::3]) for number in range(1, most)]
-                    poses, gap = self.close(closure, np.where(fixed, values, np.concatenate(others)), fixed)
+                    others = np.concatenate([self._guess(number, fixed) for number in range(1, most)])
+                    poses, gap = self.close(closure, self.held(chosen, others)[1], fixed)
                     if np.any(gap <= CLOSED):
                         return Placed(poses[[np.argmax(gap <= CLOSED)]], ~ok)
                     break
-                begin = near if near is not None and not attempt else self._guess(attempt, fixed[:, 2::3])
-                poses, gap = self.close(closure, np.where(fixed, values, begin), fixed)
+                begin = near if near is not None and not attempt else self._guess(attempt, fixed)
+                poses, gap = self.close(closure, self.held(chosen, begin)[1], fixed)
                 better = ~ok & (gap <= CLOSED)
                 best, ok = np.where(better[:, None], poses, best), ok | better
                 if np.all(ok):
@@ -169,15 +201,15 @@ class Assembly:
 
     def others(self, poses: Array) -> Iterator[Array]:
         """Yield other poses of one machine that keep all firm statements, each once (other assembly modes)."""
-        fixed, values = self.held([one for one in self.statements if one.firm])
-        known, first = [poses], np.where(fixed, values, self.guess)
-        shaken = [self._guess(attempt, fixed[:, 2::3]) for attempt in range(1, ATTEMPTS)]
-        found, gap = self.close(self.closure.at(first), np.where(fixed, values, np.concatenate(shaken)), fixed)
+        firm = [one for one in self.statements if one.firm]
+        fixed, first = self.held(firm)
+        shaken = np.concatenate([self._guess(attempt, fixed) for attempt in range(1, ATTEMPTS)])
+        found, gap = self.close(self.closure.at(first), self.held(firm, shaken)[1], fixed)
+        known = [poses]
         for closed in np.flatnonzero(gap <= CLOSED):
             other = found[[closed]]
             # Turns of a body are one pose.
-            away = [np.max(np.abs(np.exp(1j * (other - one)[:, 2::3]) - 1.0)) for one in known]
-            if min(away) > 1e-6:
+            if min(np.max(np.abs(self._poses(other).axes - self._poses(one).axes)) for one in known) > 1e-6:
                 known.append(other)
                 yield other
 
@@ -190,66 +222,56 @@ class Assembly:
         self, closure: Closure, u: Array, fixed: Flags, weight: Array | None = None, most: int = ITERATIONS
     ) -> tuple[Array, Array]:
         """Poses from u on with some held, and the largest gap left [1], (lanes,). weight: of every row; most: steps."""
-        free = np.where(fixed, 0.0, self.give)
-        u = u.copy()
-        rows = closure.rows(u)
-        if not len(rows.names):
+        if not closure.names:
             return u, np.zeros(len(u))
-        length = np.where(rows.angular, 1.0, self.size) / (1.0 if weight is None else weight)
-        gap = rows.gap / length
-        norm = np.linalg.norm(gap, axis=1)
-        damping = np.full(len(u), 1e-3)
-        running = norm > 1e-15
-        if not np.any(running):
-            return u, np.max(np.abs(gap), axis=1)
-        slope = rows.slope / length[:, None]
-        before = np.full(len(u), np.inf)
-        for iteration in range(most):
-            if not np.any(running):
-                break
-            each = slope * free[:, None, :]
-            matrix = each @ slope.transpose(0, 2, 1)
-            scale = np.sqrt(np.einsum("lkk->lk", slope * self.give @ slope.transpose(0, 2, 1)))
+        free = np.broadcast_to(np.where(fixed, 0.0, self.give), (len(u), len(self.give)))
+        length = np.where(closure.angular, 1.0, self.size) / (1.0 if weight is None else weight)
+
+        def evaluate(poses: Array, lanes: Index) -> tuple[Array, Array]:
+            every = u.copy()
+            every[lanes] = poses
+            rows = closure.rows(every)
+            self.effort += len(rows.names)
+            return (rows.gap / length)[lanes], (rows.slope / length[:, None])[lanes]
+
+        def solve(gap: Array, slope: Array, damping: Array, lanes: Index) -> Array:
+            # Displacements of least size, J W J' + mu |gap| in units of the rows (Yamashita and Fukushima 2001).
+            each = slope * free[lanes, None, :]
+            scale = np.sqrt(np.einsum("lki,i,lki->lk", slope, self.give, slope))
             scale = np.where(scale > 0, scale, 1.0)  # what closes a rod upon itself depends on no pose
-            matrix = matrix / scale[:, :, None] / scale[:, None, :]
-            small = np.clip(damping * norm, 1e-13, 1e3)
+            matrix = each @ slope.transpose(0, 2, 1) / scale[:, :, None] / scale[:, None, :]
+            small = np.maximum(damping * np.linalg.norm(gap, axis=1), SMALLEST)
             matrix += small[:, None, None] * np.eye(matrix.shape[1])
             multiplier = np.linalg.solve(matrix, (gap / scale)[..., None])[..., 0] / scale
-            step = -np.einsum("lki,lk->li", each, multiplier)
-            ahead = u + np.where(running[:, None], step, 0.0)
-            rows = closure.rows(ahead)
-            self.effort += len(rows.names)
-            new = np.linalg.norm(rows.gap / length, axis=1)
-            taken = running & (new < norm)
-            damping = np.where(taken, damping / 10.0, damping * 10.0)
-            stalled = (norm < 1e-12) & ~(new < 0.5 * norm)
-            u = np.where(taken[:, None], ahead, u)
-            gap = np.where(taken[:, None], rows.gap / length, gap)
-            slope = np.where(taken[:, None, None], rows.slope / length[:, None], slope)
-            norm = np.where(taken, new, norm)
-            running &= (norm > 1e-15) & ~stalled & (damping * norm < 1e6)
-            if iteration % _PATIENCE == _PATIENCE - 1:
-                running &= (norm < _STANDS * before) | (norm < ROUNDING)
-                before = norm
-        return u, np.max(np.abs(gap), axis=1)
+            return np.asarray(-np.einsum("lki,lk->li", each, multiplier))
+
+        limits = {"gain": GAIN, "close": 1e-15, "round_off": 1e-12}
+        found = levenberg_marquardt(evaluate, solve, u, **limits, most=most, move=self._moved)
+        return found.points, np.max(np.abs(found.residuals), axis=1)
+
+    def _poses(self, u: Array) -> Poses:
+        return Poses.of(u, len(self.scene.bodies))
+
+    def _moved(self, u: Array, step: Array) -> Array:
+        """Poses after small displacements."""
+        if self._begin is None:
+            return np.asarray(u + step)
+        return self._poses(u).moved(step.reshape(len(u), len(self.scene.bodies), -1)).numbers
 
     def _in_order(self) -> Placed:
         """Keep statements one after the other; firm ones must all be met, up to the rounding of their digits."""
         firm = [one for one in self.statements if one.firm]
-        fixed, values = self.held(firm)
-        found = self.seek(fixed, values)
+        fixed, wanted = self.held(firm)
+        found = self.seek(firm)
         kept, ok, u = fixed & found.ok[:, None], found.ok, found.poses
         if not np.all(ok):
-            none = np.zeros_like(fixed)
-            near = np.where(fixed, values, self.guess)
-            free = self.seek(none, values, near)
+            free = self.seek([], wanted)
             u, ok = np.where(ok[:, None], u, free.poses), ok | free.ok
             if not np.any(ok):
                 return Placed(u, ok)
             for one in firm:
                 u, kept = self._keep(one, u, kept)
-            length = np.tile([self.size, self.size, 1.0], len(self.scene.bodies))
-            missed = np.max(np.abs(u - values) * fixed / length, axis=1, initial=0.0)
+            missed = np.max(self._poses(u).away(self._poses(wanted)) * fixed / self.units, axis=1, initial=0.0)
             ok &= missed <= ROUNDING
         for one in self.statements:
             if not one.firm:
@@ -258,15 +280,13 @@ class Assembly:
 
     def _keep(self, one: Statement, u: Array, kept: Flags) -> tuple[Array, Flags]:
         """Hold one more statement in the lanes where that can be."""
-        more, values = kept.copy(), np.where(kept, u, 0.0)
-        more[:, one.columns], values[:, one.columns] = True, one.values
+        more, wanted = kept.copy(), u.copy()
+        more[:, one.columns], wanted[:, one.numbers] = True, one.put
         trying = ~np.all(kept[:, one.columns], axis=1)
-        if not np.any(trying) or not np.any(
-            self._free(one, u, kept) | (np.abs(u[:, one.columns] - one.values) < CLOSED)
-        ):
+        met = self._poses(u).away(self._poses(wanted))[:, one.columns] < CLOSED
+        if not np.any(trying) or not np.any(self._free(one, u, kept) | met):
             return u, kept
-        closure = self.closure.at(np.where(more, values, u), own=False)
-        found, gap = self.close(closure, np.where(more, values, u), more)
+        found, gap = self.close(self.closure.at(wanted, own=False), wanted, more)
         better = trying & (gap <= CLOSED)
         return np.where(better[:, None], found, u), np.where(better[:, None], more, kept)
 

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from shoal.mechanics.numerics.newton import newton
 from shoal.mechanics.numerics.tile import Array, Flags
 from shoal.mechanics.plane import as_complex, phasor
 from shoal.mechanics.start.closure import Closure
@@ -38,7 +39,7 @@ class Moving(NamedTuple):
 
 
 class Velocities:
-    """The search for the rates at given poses (lanes, 3 bodies)."""
+    """The search for the rates at given poses in the plane, (lanes, 3 bodies)."""
 
     def __init__(self, assembly: Assembly, poses: Array) -> None:
         self.scene, self.lanes, self.poses = assembly.scene, assembly.lanes, poses
@@ -150,19 +151,20 @@ class _Bend(NamedTuple):
         if not free.shape[0]:
             return None
         free = free / np.max(np.abs(free / self.units))
+        h = 1e-6 * scale
+
+        def correct(z: Array) -> tuple[Array, float]:
+            value = self.value(v + z @ free)
+            slope = np.stack([(self.value(v + (z + h * e) @ free) - self.value(v + (z - h * e) @ free)) / (2 * h)
+                              for e in np.eye(len(free))], 1)  # fmt: skip
+            move = np.asarray(np.linalg.lstsq(slope, -value)[0], dtype=float)
+            return move, float(np.max(np.abs(move))) / scale
+
         rng = np.random.default_rng(0)
         best, least = None, np.inf
         for attempt in range(BRANCHES):
-            z = np.zeros(len(free)) if not attempt else scale * rng.normal(size=len(free))
-            for _ in range(30):
-                value = self.value(v + z @ free)
-                h = 1e-6 * scale
-                slope = np.stack([(self.value(v + (z + h * e) @ free) - self.value(v + (z - h * e) @ free)) / (2 * h)
-                                  for e in np.eye(len(free))], 1)  # fmt: skip
-                move = np.linalg.lstsq(slope, -value)[0]
-                z = z + move
-                if np.max(np.abs(move)) < 1e-13 * scale:
-                    break
+            begin = np.zeros(len(free)) if not attempt else scale * rng.normal(size=len(free))
+            z = newton(correct, begin, close=1e-13, most=30).point
             found = v + z @ free
             if np.max(np.abs(self.value(found)), initial=0.0) <= small and np.linalg.norm(z) < least * (1 - 1e-6):
                 best, least = found, float(np.linalg.norm(z))

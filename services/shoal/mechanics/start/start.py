@@ -7,15 +7,16 @@ Stated values that miss by the rounding of their digits are corrected in the ord
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from shoal.errors import InputError
 from shoal.mechanics import plane
+from shoal.mechanics import rotation as turns
 from shoal.mechanics.affine import Affine
-from shoal.mechanics.frames import Frame, ModalFrame
+from shoal.mechanics.frames import Frame, ModalFrame, RigidFrame
 from shoal.mechanics.joints import Meet, of_scene
 from shoal.mechanics.numerics.tile import Array, Flags, Number
 from shoal.mechanics.start.closure import Rows
@@ -32,7 +33,7 @@ _EFFORT = 8_000
 """Gaps (`Assembly.effort`) after which no fewer statements are sought that contradict each other."""
 _SLACK = 1e-3
 """Part of the largest pull on a statement below which one is not pulled."""
-ROUND_OFF = 1e-9
+UNCHANGED = 1e-9
 """Changes below this, relative to the value, 1 rad, the size or the speed of the machine, are not spoken of."""
 
 
@@ -60,7 +61,7 @@ def complete(scene: Scene) -> Start:
         if not gives_numbers(scene):
             placed = placed._replace(ok=np.ones_like(placed.ok))
     if not count and not placed.ok[0]:
-        raise _pose_refused(assembly)
+        raise pose_refused(assembly)
     velocities = Velocities(assembly, placed.poses)
     moving = velocities.run()
     if not count and not moving.ok[0]:
@@ -121,10 +122,9 @@ def is_direct(scene: Scene) -> bool:
     return len(set(placed)) == len(placed)
 
 
-def _pose_refused(assembly: Assembly) -> InputError:
+def pose_refused(assembly: Assembly) -> InputError:
     """Return an error that names the stated poses in contradiction, or the joint that cannot be closed at all."""
-    none = np.zeros_like(assembly.guess, dtype=bool)
-    if not assembly.seek(none, np.zeros_like(assembly.guess)).ok[0]:
+    if not assembly.seek([]).ok[0]:
         name, gap, _ = _gape(assembly, [])
         return InputError(f"joints.{name}: cannot be assembled; its places stay {gap} apart at best")
     guilty, fewest = _narrowed(assembly, [one for one in assembly.statements if one.firm])
@@ -167,9 +167,9 @@ def _narrowed(assembly: Assembly, guilty: list[Statement]) -> tuple[list[Stateme
 
 def _held_open(assembly: Assembly, chosen: list[Statement]) -> tuple[Array, Rows]:
     """Return weights of the rows, and the rows of least gaps in joints that close loops, with statements kept."""
-    fixed, values = assembly.held(chosen)
+    fixed, begin = assembly.held(chosen)
     weight = np.where(np.isin(assembly.closure.rows(assembly.guess).names, assembly.walk.closing), 1.0, 1e3)
-    u, _ = assembly.close(assembly.closure, np.where(fixed, values, assembly.guess), fixed, weight)
+    u, _ = assembly.close(assembly.closure, begin, fixed, weight)
     return weight, assembly.closure.rows(u)
 
 
@@ -221,7 +221,7 @@ def _rates_refused(velocities: Velocities, broken: list[Statement]) -> InputErro
     names = dict.fromkeys((*velocities.walk.closing, *velocities.rows.names))
     joint = next((name for name in names if last not in velocities.run(joint=name).broken), "")
     told = velocities.run(without=last).rates[0, last.columns]
-    told = np.where(np.abs(told) > ROUND_OFF * velocities.speed, told, 0.0)
+    told = np.where(np.abs(told) > UNCHANGED * velocities.speed, told, 0.0)
     wants = f"joint {joint} asks for {_written(told)} {UNITS[last.quantity]}" if joint else "they cannot both hold"
     return _contradiction([*guilty, last], wants)
 
@@ -248,31 +248,48 @@ def _written(values: Array) -> str:
 
 
 def begun(frames: Mapping[str, Frame], scene: Scene, q: Array, v: Array) -> dict[str, InitialState]:
-    """The state of every body at the coordinates q and rates v of a machine, each (unknowns,); scene: started.
+    """Return the state of every body at the coordinates q and rates v of a machine, each (unknowns,).
 
+    scene: in the plane with a complete start, to whose angles whole turns are counted. In space rods have no attitude.
     Of (unknowns, lanes) its numbers are arrays, without modes.
     """
     found = {}
-    origin = (0.0,) * plane.DIMENSIONS
+    origin = (0.0,) * scene.dimensions
     for name, frame in frames.items():
-        modes, mode_rates = tuple[float, ...](), tuple[float, ...]()
-        if isinstance(frame, ModalFrame):
-            place, axis = frame.origin, frame.directors[0]
-            modes, mode_rates = _bending(frame, q, v) if q.ndim == 1 else (modes, mode_rates)
+        place = frame.origin if isinstance(frame, ModalFrame) else frame.point(origin)
+        if scene.dimensions == plane.DIMENSIONS:
+            attitude = _angle(frame, scene.start(name).angle, q, v)
         else:
-            place, axis = frame.point(origin), frame.direction(origin)
-        near, along, turning = scene.start(name).angle, place_at(axis, q), rate_at(axis, v)
-        turn = plane.angle(along) - near
+            attitude = _rotation(frame, q, v) if isinstance(frame, RigidFrame) else {}
         found[name] = InitialState.model_construct(
-            angle=_number(near + turn - 2 * np.pi * np.rint(turn / (2 * np.pi))),
-            rate=_number(plane.cross(along, turning) / sum(along**2)),
-            position=tuple(map(_number, place_at(place, q))),
-            velocity=tuple(map(_number, rate_at(place, v))),
-            modes=modes,
-            mode_rates=mode_rates,
-            guess=(),
+            position=_numbers(place_at(place, q)), velocity=_numbers(rate_at(place, v)), guess=(), **attitude
         )
     return found
+
+
+def _angle(frame: Frame, near: Number, q: Array, v: Array) -> dict[str, Any]:
+    """The angle of a body in the plane, its rate, and its modes; near: an angle that tells the whole turns [rad]."""
+    modes, mode_rates = tuple[float, ...](), tuple[float, ...]()
+    if isinstance(frame, ModalFrame):
+        axis = frame.directors[0]
+        modes, mode_rates = _bending(frame, q, v) if q.ndim == 1 else (modes, mode_rates)
+    else:
+        axis = frame.direction((0.0,) * plane.DIMENSIONS)
+    along, turning = place_at(axis, q), rate_at(axis, v)
+    turn = plane.angle(along) - near
+    angle = near + turn - 2 * np.pi * np.rint(turn / (2 * np.pi))
+    (angle, rate) = _numbers([angle, plane.cross(along, turning) / sum(along**2)])
+    return {"angle": angle, "rate": rate, "modes": modes, "mode_rates": mode_rates}
+
+
+def _rotation(frame: RigidFrame, q: Array, v: Array) -> dict[str, Any]:
+    """The rotation vector and the spin of a rigid body in space."""
+    directors = np.array([place_at(one, q) for one in frame.directors])
+    turning = np.array([rate_at(one, v) for one in frame.directors])
+    lanes = directors.reshape(*directors.shape[:2], -1).swapaxes(0, 1)
+    vectors = np.stack([turns.vector_of(lanes[..., lane]) for lane in range(lanes.shape[2])], axis=1)
+    spin = 0.5 * np.sum(np.cross(directors, turning, axis=1), axis=0)
+    return {"rotation": _numbers(vectors.reshape(spin.shape)), "spin": _numbers(spin)}
 
 
 def _bending(frame: ModalFrame, q: Array, v: Array) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -283,9 +300,9 @@ def _bending(frame: ModalFrame, q: Array, v: Array) -> tuple[tuple[float, ...], 
     return modes, tuple(float(e @ one.rate(v) + turning @ one.at(q)) for one, _ in frame.measured)
 
 
-def _number(x: Any) -> Any:
-    """A number of Python, or an array over lanes as it is."""
-    return x if np.ndim(x) else float(x)
+def _numbers(parts: Iterable[Any]) -> tuple[Any, ...]:
+    """Numbers of Python, or arrays over lanes as they are."""
+    return tuple(x if np.ndim(x) else float(x) for x in parts)
 
 
 def place_at(vector: Affine, q: Array) -> Array:
@@ -321,7 +338,7 @@ def changes(scene: Scene, used: Mapping[str, InitialState], size: Number, lanes:
             if now is None:
                 continue
             off = np.max(np.abs(now[: len(stated)] - stated[: len(now)]), axis=0)
-            small = ROUND_OFF * np.maximum(np.max(np.abs(stated), axis=0), least.get(quantity, 1.0))
+            small = UNCHANGED * np.maximum(np.max(np.abs(stated), axis=0), least.get(quantity, 1.0))
             about_z = np.broadcast_to(told == quantity or np.all(np.abs(now[:2]) <= small, axis=0), lanes)
             for lane in np.flatnonzero(off > small):
                 name_told = quantity if about_z[lane] else told

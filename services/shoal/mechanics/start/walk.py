@@ -52,8 +52,8 @@ class Walk:
                             return there.body, here, there, 0.0
                         if condition.length is not None:
                             return there.body, here, there, value_of(condition.length)
-        # Any other condition than these may determine it.
-        if any(
+        # Any other condition than these may determine it; in space it starts at the origin.
+        if self.scene.dimensions == 3 or any(
             not isinstance(condition, _TWO_SIDED) and not condition.is_of_start for _, condition in of_scene(self.scene)
         ):
             return next(iter(waiting)), None, None, 0.0

@@ -12,7 +12,7 @@ import numpy as np
 from shoal.errors import InputError
 from shoal.response.kept import TimeIsUpError
 from shoal.response.limits.counted import contradiction
-from shoal.response.limits.estimate import Estimate
+from shoal.response.limits.estimate import ExceedanceEstimate
 from shoal.response.limits.form import APART, SHARES, DesignPoint, design_points, distinct
 from shoal.response.limits.importance import Sample, adapted, controlled, sample
 from shoal.response.limits.margins import Margins, least
@@ -69,7 +69,7 @@ class Passing:
     limit would be if it were elsewhere, None where there are none
     """
 
-    estimate: Estimate
+    estimate: ExceedanceEstimate
     points: list[DesignPoint]
     why: str
     doubt: str = ""
@@ -97,7 +97,9 @@ def form(margins: Margins, seed: int) -> Passing:
     doubt = "" if points[0].converged else "FORM did not converge"
     if not doubt and len(points) > 1:
         doubt = f"{len(points)} design points were found and FORM takes the nearest only"
-    return Passing(Estimate(passed, np.full(instants, np.nan), "FORM"), points, "FORM: first-order estimate", doubt)
+    return Passing(
+        ExceedanceEstimate(passed, np.full(instants, np.nan), "FORM"), points, "FORM: first-order estimate", doubt
+    )
 
 
 def by_importance(margins: Margins, seed: int) -> Passing:
@@ -286,8 +288,8 @@ def _where(place: Array) -> DesignPoint:
     return DesignPoint(place, place / beta, math.nan, beta, -1, False)
 
 
-def _nothing(why: str) -> Estimate:
-    return Estimate(np.array([np.nan]), np.array([np.nan]), why, unseen=1.0)
+def _nothing(why: str) -> ExceedanceEstimate:
+    return ExceedanceEstimate(np.array([np.nan]), np.array([np.nan]), why, unseen=1.0)
 
 
 def _told(points: list[DesignPoint]) -> str:
@@ -296,7 +298,7 @@ def _told(points: list[DesignPoint]) -> str:
     return f"{what} (beta {betas})"
 
 
-def _weak(estimate: Estimate, samples: list[Sample], points: list[DesignPoint], *, ended: bool) -> str:
+def _weak(estimate: ExceedanceEstimate, samples: list[Sample], points: list[DesignPoint], *, ended: bool) -> str:
     """Empty, or why runs around design points do not tell the probability. ended: whether the search for these did."""
     sure = [point for point in points if point.converged]
     if not estimate.probability and sure:
@@ -311,7 +313,9 @@ def _weak(estimate: Estimate, samples: list[Sample], points: list[DesignPoint], 
     return _coarse(estimate)
 
 
-def _disagree(one: Estimate, name: str, other: Estimate, least: float, told: str, *, both: bool = False) -> str:
+def _disagree(
+    one: ExceedanceEstimate, name: str, other: ExceedanceEstimate, least: float, told: str, *, both: bool = False
+) -> str:
     """Return that an independent estimate is larger (or, for `both`, smaller) than chance allows, else "".
 
     least: coefficient of variation of the other at least; told: what it is
@@ -325,7 +329,7 @@ def _disagree(one: Estimate, name: str, other: Estimate, least: float, told: str
     return f"{name} says {one.probability:.1e} and {told} {other.probability:.1e}"
 
 
-def _coarse(estimate: Estimate) -> str:
+def _coarse(estimate: ExceedanceEstimate) -> str:
     """Empty, or how coarse the estimate is."""
     if not estimate.probability:
         return ""

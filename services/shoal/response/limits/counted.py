@@ -7,7 +7,7 @@ import math
 import numpy as np
 from scipy import stats
 
-from shoal.response.limits.estimate import Estimate
+from shoal.response.limits.estimate import ExceedanceEstimate
 from shoal.trajectory import Array
 
 CHANCE = 1e-3
@@ -16,7 +16,7 @@ ROUGH = 2.0
 """A probability without an interval may be off by this factor."""
 
 
-def contradiction(estimate: Estimate, margins: Array, share: float = 1.0, outside: float = 1.0) -> str:
+def contradiction(estimate: ExceedanceEstimate, margins: Array, share: float = 1.0, outside: float = 1.0) -> str:
     """In words, empty where the number of runs that pass is a likely one (binomial tests of both ends, one-sided).
 
     margins: of runs drawn from the distributions, (runs, instants); share: of them that counts as independent;
@@ -35,7 +35,7 @@ def contradiction(estimate: Estimate, margins: Array, share: float = 1.0, outsid
     return f"{said}, but of {made} {runs} {passed} pass it, which makes {outside * passed / made:.1e}"
 
 
-def ends(estimate: Estimate) -> tuple[float, float]:
+def ends(estimate: ExceedanceEstimate) -> tuple[float, float]:
     """Return the ends of the interval of 95 % confidence, or of one around a probability that has none."""
     lower, upper = (float(end[-1]) for end in estimate.interval)
     if not math.isnan(lower) and not math.isnan(upper):

@@ -12,7 +12,7 @@ import numpy as np
 
 from shoal.response.inputs import IntArray
 from shoal.response.limits.counted import contradiction, ends
-from shoal.response.limits.estimate import Estimate
+from shoal.response.limits.estimate import ExceedanceEstimate
 from shoal.response.limits.judged import Judged
 from shoal.response.limits.limit import Limit
 from shoal.response.machine import Machine
@@ -34,7 +34,7 @@ def crosschecked(judged: Judged, machine: Machine, values: Array, *, shared: boo
     return replace(judged, passing=replace(judged.passing, doubt=doubt))
 
 
-def allowing(told: Statistics, machine: Machine, limit: Limit, estimate: Estimate) -> tuple[Statistics, str]:
+def allowing(told: Statistics, machine: Machine, limit: Limit, estimate: ExceedanceEstimate) -> tuple[Statistics, str]:
     """Statistics whose errors allow for the probability of a limit; in words what they have missed, if anything."""
     columns = _columns(machine, limit)
     if columns is None:
@@ -55,7 +55,7 @@ def allowing(told: Statistics, machine: Machine, limit: Limit, estimate: Estimat
     return replace(told, error=error, std_error=std_error), missed
 
 
-def shifts(limit: Limit, mean: Array, error: Array, estimate: Estimate) -> tuple[Array, Array]:
+def shifts(limit: Limit, mean: Array, error: Array, estimate: ExceedanceEstimate) -> tuple[Array, Array]:
     """Return the shift of the mean and the least standard deviation that a probability implies, (instants,) each.
 
     With probability p beyond a bound at distance d from the mean that is p d and, by Cantelli's inequality,

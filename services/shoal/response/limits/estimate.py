@@ -15,7 +15,7 @@ CONFIDENCE = 1.959963984540054
 
 
 @dataclass(frozen=True)
-class Estimate:
+class ExceedanceEstimate:
     """The probability that a limit is passed at some instant up to each.
 
     passed: (instants,); deviation: of its logarithm, (instants,), infinite where no run has passed; unseen: a
@@ -62,7 +62,7 @@ def first_passages(margins: Array) -> IntArray:
     return np.asarray(np.where(beyond.any(axis=1), beyond.argmax(axis=1), margins.shape[1]))
 
 
-def weighted(margins: Array, weights: Array, why: str) -> Estimate:
+def weighted(margins: Array, weights: Array, why: str) -> ExceedanceEstimate:
     """From independent runs with weights (those of plain ones are 1)."""
     count, instants = margins.shape
     first = first_passages(margins)
@@ -76,7 +76,7 @@ def weighted(margins: Array, weights: Array, why: str) -> Estimate:
     lost = float(weights[np.isnan(margins).any(axis=1)].sum() / count)
     # No event in n runs: less than 3.7 / n with 97.5 % confidence.
     unseen = 1 - 0.025 ** (1 / count)
-    return Estimate(passed, deviation, why, unseen, lost, _between(margins, weights))
+    return ExceedanceEstimate(passed, deviation, why, unseen, lost, _between(margins, weights))
 
 
 def _between(margins: Array, weights: Array) -> float:

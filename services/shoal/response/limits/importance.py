@@ -27,7 +27,7 @@ from scipy import special
 from scipy.cluster import vq
 
 from shoal.response.inputs import BoolArray, IntArray
-from shoal.response.limits.estimate import Estimate, first_passages, weighted
+from shoal.response.limits.estimate import ExceedanceEstimate, first_passages, weighted
 from shoal.response.limits.form import DesignPoint
 from shoal.response.limits.margins import Margins, least
 from shoal.trajectory import Array
@@ -180,7 +180,7 @@ class Sample:
     outside: tuple[tuple[Array, float], ...] = ()
 
     @property
-    def estimate(self) -> Estimate:
+    def estimate(self) -> ExceedanceEstimate:
         """Weighted estimate of the probability."""
         return weighted(self.rows, self.weights, f"importance sampling with {len(self.places)} runs")
 
@@ -213,7 +213,7 @@ def sample(margins: Margins, proposal: Mixture, count: int, seed: int) -> Sample
     return Sample(places, rows, proposal.weights(places), outside)
 
 
-def controlled(found: Sample, proposal: Mixture, chances: Callable[[Array], Array], seed: int) -> Estimate:
+def controlled(found: Sample, proposal: Mixture, chances: Callable[[Array], Array], seed: int) -> ExceedanceEstimate:
     """The estimate of these runs with a control variate.
 
     proposal: that they are drawn from; chances: of a place to lie beyond the limit, by a response surface, (places,)

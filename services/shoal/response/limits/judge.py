@@ -34,7 +34,7 @@ the germs of the former, (instants, parameters); runs made, and how many failed.
 
 
 @dataclass(frozen=True)
-class Watch:
+class MarginWatch:
     """Margins of a limit at the last instants of a trajectory."""
 
     limit: Limit
@@ -47,7 +47,7 @@ class Watch:
 
 def watched(machine: Machine, limit: Limit) -> Machine:
     """Return the machine with the margins of a limit as its answers."""
-    told = Watch(limit, len(machine.times)).margins
+    told = MarginWatch(limit, len(machine.times)).margins
     return replace(
         machine,
         scene=limit.scene(machine.scene),
@@ -149,7 +149,7 @@ def _between(limit: Limit, machine: Machine, shown: Shown) -> float | None:
         motion = engine.simulate(scene, limit.instants(when))
         if not motion.ok:
             return None
-        margins = Watch(limit, len(when)).margins(motion, scene, {})[0]
+        margins = MarginWatch(limit, len(when)).margins(motion, scene, {})[0]
         if (passed := margins < 0).any():
             return float(when[passed.argmax()])
         steps = np.abs(np.diff(margins))
@@ -180,7 +180,7 @@ def _shown(
     motion: Trajectory,
     settings: Mapping[str, float],
 ) -> Shown:
-    margins = Watch(limit, len(times)).margins(motion, scene, {})[0]
+    margins = MarginWatch(limit, len(times)).margins(motion, scene, {})[0]
     instant = int(np.argmin(margins))
     return Shown(
         dict(zip(inputs.names, named.tolist(), strict=True)),

@@ -13,7 +13,7 @@ from shoal.error_budget import ErrorBudget
 from shoal.response.control import unseen
 from shoal.response.inputs import Inputs
 from shoal.response.limits.choice import Passing
-from shoal.response.limits.estimate import Estimate
+from shoal.response.limits.estimate import ExceedanceEstimate
 from shoal.response.limits.form import DesignPoint
 from shoal.response.limits.limit import Limit
 from shoal.response.limits.margin_errors import MarginErrors
@@ -158,7 +158,7 @@ class Judged:
         return none if self.shown is None or self.shown.errors is None else self.shown.errors.budget
 
     @property
-    def estimates(self) -> list[Estimate]:
+    def estimates(self) -> list[ExceedanceEstimate]:
         """Probabilities over time: one, or the least and the largest over intervals, none where all are intervals."""
         every = [self] if self.between is None else [self.between.lower, self.between.upper]
         return [one.passing.estimate for one in every if one.passing is not None]

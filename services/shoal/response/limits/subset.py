@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shoal.response.inputs import BoolArray, IntArray
-from shoal.response.limits.estimate import Estimate, first_passages
+from shoal.response.limits.estimate import ExceedanceEstimate, first_passages
 from shoal.response.limits.importance import Sample
 from shoal.response.limits.margins import Margins, least
 from shoal.response.runs import TooManyRunsError
@@ -41,7 +41,7 @@ class Levels:
     sample: all runs, those of a level down to where the next one begins: a stratified sample of the distributions
     """
 
-    estimate: Estimate
+    estimate: ExceedanceEstimate
     places: Array
     margins: Array
     first: Array
@@ -94,7 +94,7 @@ def subset(margins: Margins, count: int, seed: int) -> Levels:
     elif not beyond.any():
         below = f"{weight * SHARE:.2g}"
         why += f"; none has passed the limit, whose probability is below {below} or not reached by its chains"
-    estimate = Estimate(weight * share, deviation, why, weight * SHARE, lost)
+    estimate = ExceedanceEstimate(weight * share, deviation, why, weight * SHARE, lost)
     strata.append(Sample(u, rows, np.full(len(u), weight / count)))
     return Levels(estimate, u[beyond], rows[beyond], plain, _together(strata))
 

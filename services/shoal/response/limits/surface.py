@@ -45,7 +45,7 @@ BLOCK = 10_000
 
 
 @dataclass(frozen=True)
-class Terms:
+class SurfaceTerms:
     """Terms of a response surface.
 
     degree: of the polynomials of one parameter; products: whether there are those of two; scales: medians and standard
@@ -85,7 +85,7 @@ class Surface:
     as a share of the margins there
     """
 
-    terms: Terms
+    terms: SurfaceTerms
     coefficients: Array
     spread: Array
     error: float
@@ -131,7 +131,7 @@ def fit_surface(inputs: Inputs, places: Array, rows: Array) -> Surface | None:
     few = instants[np.linspace(0, len(instants) - 1, min(DECIDING, len(instants))).round().astype(int)]
     near = [_near(rows[:, k]) for k in few]
 
-    def error(terms: Terms) -> float:
+    def error(terms: SurfaceTerms) -> float:
         basis = terms(places)
         return sum((_fit(basis, rows[:, k])[1] / size) ** 2 for k, size in zip(few, near, strict=True))
 
@@ -143,7 +143,7 @@ def fit_surface(inputs: Inputs, places: Array, rows: Array) -> Surface | None:
     return Surface(terms, np.stack([found for found, _ in fits], axis=1), spread, float((spread / sizes).max()))
 
 
-def _candidates(inputs: Inputs, places: Array) -> Iterator[Terms]:
+def _candidates(inputs: Inputs, places: Array) -> Iterator[SurfaceTerms]:
     scales = [None]
     if any(not isinstance(one.marginal, Normal) or one.marginal.logarithmic for one in inputs.parameters):
         values = inputs.named(inputs.standard(places))
@@ -151,7 +151,7 @@ def _candidates(inputs: Inputs, places: Array) -> Iterator[Terms]:
     for scale in scales:
         for degree in DEGREES:
             if scale is None or degree <= HIGHEST:
-                yield from (Terms(inputs, degree, products, scale) for products in (False, True))
+                yield from (SurfaceTerms(inputs, degree, products, scale) for products in (False, True))
 
 
 def _deciding(rows: Array) -> IntArray:

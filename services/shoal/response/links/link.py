@@ -10,7 +10,7 @@ import numpy as np
 
 from shoal.response.expansion import Expansion
 from shoal.response.inputs import BoolArray, Inputs, IntArray
-from shoal.response.runs import Runs
+from shoal.response.runs import CachedModel
 from shoal.response.study import Study
 from shoal.trajectory import Array
 
@@ -66,4 +66,6 @@ def some(study: Study, columns: IntArray) -> Study:
 def of(study: Study, inputs: Inputs, germs: Array, values: Array) -> Study:
     """With other answers."""
     good = np.ones(len(germs), dtype=bool)
-    return replace(study, runs=Runs(study.runs.model, inputs, len(germs), None, 0, "", [germs], [values], [good]))
+    return replace(
+        study, runs=CachedModel(study.runs.model, inputs, len(germs), None, 0, "", [germs], [values], [good])
+    )

@@ -49,7 +49,7 @@ MORE = 8
 
 
 @dataclass(frozen=True)
-class Round:
+class StudyState:
     """Where a study stands.
 
     surrogate: fitted to all runs; error: of the last one at runs that it had not seen, (columns,); gap: by which outer
@@ -86,7 +86,7 @@ def bounds(study: Study) -> Found:
     return Found(why, here.surrogate, here.error, looked=here.looked)
 
 
-def _grown(plan: Screened, here: Round, degree: int) -> tuple[Round, int]:
+def _grown(plan: Screened, here: StudyState, degree: int) -> tuple[StudyState, int]:
     """Until outer and attained bounds meet, or no more runs help; and the degree."""
     again = 0
     with suppress(TooManyRunsError):
@@ -175,7 +175,7 @@ def _run_signs(plan: Screened, linear: Expansion) -> None:
     study.runs(ways[np.argsort(-count, kind="stable")[:most]])
 
 
-def _round(plan: Screened, degree: int, before: Decay | None = None) -> Round:
+def _round(plan: Screened, degree: int, before: Decay | None = None) -> StudyState:
     """Fit, find the extremal points, run those that promise most, fit again."""
     study, runs, parameters = plan.study, plan.study.runs, len(plan.study.inputs)
     surrogate, columns = _foretold(plan, degree), runs.values.shape[1]
@@ -202,7 +202,7 @@ def _round(plan: Screened, degree: int, before: Decay | None = None) -> Round:
         # If this ends the study it is the answer.
         looked = looked_at(study, surrogate, error)
         gap = looked.told.gap
-    return Round(surrogate, error, gap, len(new), looked, decay)
+    return StudyState(surrogate, error, gap, len(new), looked, decay)
 
 
 def _promising(plan: Screened, surrogate: Expansion, found: Extremes) -> Array:
@@ -258,7 +258,7 @@ def _late(plan: Screened) -> bool:
     return plan.study.runs.own >= ENOUGH * plan.fair
 
 
-def _done(plan: Screened, here: Round) -> bool:
+def _done(plan: Screened, here: StudyState) -> bool:
     study, wanted = plan.study, _enough(plan)
     if here.gap.max() <= wanted:
         return True

@@ -63,7 +63,8 @@ def entropic_quantiles(values: Array, moments: int) -> tuple[Array, BoolArray]:
 def _newton(basis: Array, weights: Array, wanted: Array) -> tuple[Array, BoolArray]:
     """Exponents, (columns, moments), that give these moments, and where they do.
 
-    The dual log(integral of exp(l . phi)) - l . m is convex; its gradient is what moments are off by.
+    The dual log(integral of exp(l . phi)) - l . m is convex; its gradient is the error of the moments. All columns are
+    one batch, each with the line search of Armijo, which `numerics.newton` does not have.
     """
     powers = np.zeros_like(wanted)
     value, gradient, hessian = _dual(basis, weights, wanted, powers)

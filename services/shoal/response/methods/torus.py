@@ -13,6 +13,7 @@ from itertools import combinations
 import numpy as np
 from scipy.signal import windows
 
+from shoal.mechanics.numerics.newton import newton
 from shoal.response.course import UnsuitableError, Watch
 from shoal.response.expansion import fit
 from shoal.response.inputs import Inputs, IntArray
@@ -38,7 +39,7 @@ SETTLED = 1e-10
 
 
 @dataclass(frozen=True)
-class Spectrum:
+class LineSpectrum:
     """One run. frequencies [rad/s], (base,); coefficients: of cosines, then sines, (2 K, signals)"""
 
     frequencies: Array
@@ -119,7 +120,7 @@ class Torus:
             )
         self.known = best.frequencies
 
-    def of(self, course: Array) -> Spectrum:
+    def of(self, course: Array) -> LineSpectrum:
         """The lines of one run. Raises UnsuitableError where they do not tell it."""
         assert self.known is not None
         lines = _lines(self.watch.times, course / self._range, 2 * LINES)
@@ -131,7 +132,7 @@ class Torus:
             )
         return found
 
-    def surrogate(self, study: Study, germs: Array, runs: list[Spectrum], terms: Terms) -> Wound:
+    def surrogate(self, study: Study, germs: Array, runs: list[LineSpectrum], terms: Terms) -> Wound:
         """See `LongTime`."""
         told = np.stack([np.concatenate([run.frequencies, run.coefficients.ravel()]) for run in runs])
         found = fit(study.inputs, germs, told, terms).coefficients
@@ -139,32 +140,35 @@ class Torus:
         waves = found[:, base:].reshape(len(terms), *runs[0].coefficients.shape)
         return Wound(study.inputs, terms, found[:, :base], waves, self.orders, study.when)
 
-    def _fitted(self, course: Array, frequencies: Array, orders: IntArray) -> Spectrum:
-        """Gauss-Newton steps of the frequencies; coefficients are eliminated."""
+    def _fitted(self, course: Array, frequencies: Array, orders: IntArray) -> LineSpectrum:
+        """Fit the frequencies by the Gauss-Newton method; coefficients are eliminated (variable projection)."""
         times, most = self.watch.times, PER_TERM * 2 * len(orders)
         some = np.arange(len(times))
         if len(times) > most:
             some = np.sort(np.random.default_rng(0).choice(len(times), most, replace=False))
         t, y = times[some], course[some] / self._range
-        w = np.array(frequencies)
-        for _ in range(REFINED):
+
+        def projected(w: Array) -> tuple[Array, Array, Array, Array, Array, Array]:
             angle = t[:, None] * (orders @ w)
             cosine, sine = np.cos(angle), np.sin(angle)
             basis = np.concatenate([cosine, sine[:, 1:]], axis=1)
             q, r = np.linalg.qr(basis)
             c = np.linalg.lstsq(r, q.T @ y, rcond=1e-13)[0]
             a, b = c[: len(orders)], np.concatenate([np.zeros((1, c.shape[1])), c[len(orders) :]])
-            rest = y - basis @ c
+            return cosine, sine, q, a, b, y - basis @ c
+
+        def correct(w: Array) -> tuple[Array, float]:
+            cosine, sine, q, a, b, rest = projected(w)
             slopes = []
             for k in range(len(w)):
                 slope = t[:, None] * (cosine @ (orders[:, k, None] * b) - sine @ (orders[:, k, None] * a))
                 slopes.append((slope - q @ (q.T @ slope)).ravel())
             step = np.linalg.lstsq(np.stack(slopes, axis=1), rest.ravel(), rcond=1e-12)[0]
-            limit = 0.5 * np.pi / times[-1]
-            w = w + np.clip(step, -limit, limit)
-            if np.abs(step).max() * times[-1] < SETTLED:
-                break
-        return Spectrum(w, np.concatenate([a, b]) * self._range, float(np.abs(rest).max()))
+            return np.asarray(step, dtype=float), float(np.abs(step).max() * times[-1])
+
+        w = newton(correct, np.array(frequencies), close=SETTLED, longest=0.5 * np.pi, most=REFINED).point
+        *_, a, b, rest = projected(w)
+        return LineSpectrum(w, np.concatenate([a, b]) * self._range, float(np.abs(rest).max()))
 
 
 def whole(base: int, order: int) -> IntArray:

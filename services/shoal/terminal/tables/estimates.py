@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 def estimate_table(estimate: Estimate) -> None:
     """The verdict, then values with intervals, other minima, what the residuals say, and what to do next."""
     screen.say(f"verdict: {estimate.verdict}", style="bold")
-    screen.say(*(f"  {reason}" for reason in filter(None, estimate.message.split("; "))))
+    screen.say(*(f"  {one.text}" for one in estimate.findings))
     table = screen.table(f"{estimate.problem}, {estimate.method}", "parameter", "value", "95 % interval", "known")
     for name, value in {**estimate.parameters, **estimate.quantities}.items():
         known = estimate.known(value)

@@ -86,7 +86,7 @@ def sweep_table(sweep: Sweep) -> None:
     screen.out.print(table)
     screen.say(*reasons(sweep))
     if sweep.elsewhere:
-        screen.say(sweep.elsewhere.told("points"))
+        screen.say(sweep.elsewhere.describe("points"))
     if sweep.check is not None:
         screen.say(str(sweep.check))
 

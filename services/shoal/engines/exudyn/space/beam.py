@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from shoal.engines.exudyn.bodies import Energy, Part, Place, System
+from shoal.engines.exudyn.bodies import BodyPart, Energy, Place, System
 from shoal.engines.exudyn.chain import Chain
-from shoal.engines.exudyn.space.bodies import Motion, Side, local_rates
+from shoal.engines.exudyn.space.bodies import Side, SpatialPointMotion, local_rates
 from shoal.engines.exudyn.user import rotation, rotation_slope
 from shoal.engines.sections import Sections
 from shoal.errors import InputError
@@ -33,7 +33,7 @@ PER_ELEMENT = 2
 
 
 @dataclass(frozen=True)
-class SpatialBeamPart(Chain, Part):
+class SpatialBeamPart(Chain, BodyPart):
     """A chain of ObjectBeamGeometricallyExact; coordinates of a node: r and Euler parameters of the section.
 
     stiffness: EA, kGA, kGA, GJ, EI about y and z of every element, (elements, 6); inertia: rho times the polar and
@@ -115,7 +115,7 @@ class SpatialBeamPart(Chain, Part):
         velocity = (1 - part) * speed[:, :3] + part * speed[:, 7:10]
         spins = (spin_of(here[:, 3:7], speed[:, 3:7]), spin_of(here[:, 10:], speed[:, 10:]))
         spin = (1 - part) * spins[0] + part * spins[1]
-        return Motion(position, velocity, axes, np.cross(spin[:, :, None], axes, axis=1))
+        return SpatialPointMotion(position, velocity, axes, np.cross(spin[:, :, None], axes, axis=1))
 
     def energy(self, q: Array, v: Array) -> Energy:
         """See Part."""

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from shoal.engines.exudyn.bodies import Energy, Part, Place, System
+from shoal.engines.exudyn.bodies import BodyPart, Energy, Place, System
 from shoal.engines.exudyn.cable import CablePart, add_cables
 from shoal.engines.exudyn.ground import GroundPart
 from shoal.engines.exudyn.user import rotation, rotation_slope
@@ -23,7 +23,7 @@ from shoal.scene.dimensions import padded
 from shoal.trajectory import Array
 
 
-class Motion(NamedTuple):
+class SpatialPointMotion(NamedTuple):
     """One material point: position [m] and velocity [m/s] (rows, 3), axes of its body and their rates (rows, 3, 3).
 
     The axes are columns. Of a cable only the first is known, along the tangent and of no unit length.
@@ -93,7 +93,7 @@ class Framed:
 
 
 @dataclass(frozen=True)
-class SolidPart(Framed, Part):
+class SolidPart(Framed, BodyPart):
     """ObjectRigidBody on a node of Euler parameters, to which no attitude is singular, at the body's origin.
 
     A point mass is a ball held at its centre, where nothing turns it; its inertia is of no consequence.
@@ -147,7 +147,7 @@ class SolidPart(Framed, Part):
         axes = rotation(q[:, 3:])
         turning = np.einsum("rijk,rk->rij", rotation_slope(q[:, 3:]), v[:, 3:])
         at = np.array(place)
-        return Motion(q[:, :3] + axes @ at, v[:, :3] + turning @ at, axes, turning)
+        return SpatialPointMotion(q[:, :3] + axes @ at, v[:, :3] + turning @ at, axes, turning)
 
     def energy(self, q: Array, v: Array) -> Energy:
         """See Part."""
@@ -209,7 +209,7 @@ class SpatialCablePart(CablePart):
         position, velocity = (self.values(shape, x)[:, index, 0] for x in (q, v))
         tangent, turn = (self.values(slope, x)[:, index, 0] for x in (q, v))
         none = np.full((len(q), 3, 2), np.nan)
-        return Motion(
+        return SpatialPointMotion(
             position,
             velocity,
             np.concatenate([tangent[:, :, None], none], axis=2),
@@ -238,7 +238,9 @@ class SpatialGround(Framed, GroundPart):
         """See SpatialHolder."""
         rows = len(q)
         still = np.zeros((rows, 3, 3))
-        return Motion(np.tile(np.array(place, dtype=float), (rows, 1)), still[:, 0], still + np.eye(3), still)
+        return SpatialPointMotion(
+            np.tile(np.array(place, dtype=float), (rows, 1)), still[:, 0], still + np.eye(3), still
+        )
 
 
 def local_rates(turn: Array) -> Array:

@@ -10,7 +10,7 @@ import numpy as np
 from shoal.engines.capabilities import loops
 from shoal.engines.course import Clock
 from shoal.engines.exudyn.bodies import System
-from shoal.engines.exudyn.build import Beam, Machine, silence
+from shoal.engines.exudyn.build import Beam, ExudynSystem, silence
 from shoal.engines.exudyn.ground import drive, driven
 from shoal.engines.exudyn.space.beam import SpatialBeamPart
 from shoal.engines.exudyn.space.bodies import SolidPart, SpatialCablePart, SpatialGround
@@ -18,10 +18,11 @@ from shoal.engines.exudyn.space.ends import SpatialEnds
 from shoal.engines.exudyn.space.joints import add_friction, add_joint, still
 from shoal.engines.exudyn.space.loads import add_load
 from shoal.mechanics.assembly.groups import moving
-from shoal.mechanics.assembly.space.start import begun, place_started
+from shoal.mechanics.assembly.space.start import place_started
 from shoal.mechanics.frames import BeamFrame, PointFrame
 from shoal.mechanics.numerics.tile import stacked
 from shoal.mechanics.reach import span
+from shoal.mechanics.start.start import begun
 from shoal.scene import GROUND, ModalBody, PointMass, Rod, Scene
 from shoal.scene.dimensions import padded
 
@@ -31,7 +32,7 @@ DEPENDENT = 1e-9
 
 def build_in_space(
     exu: Any, scene: Scene, beam: Beam, end: float | None = None, system_of: type[System] = System
-) -> Machine:
+) -> ExudynSystem:
     """Enter bodies, gravity, joints and loads at the initial state. Raises InputError.
 
     beam, end, system_of: as of `build`
@@ -74,9 +75,9 @@ def build_in_space(
     exchanges += [add_load(ends, name, load) for name, load in scene.loads.items()]
     mbs.Assemble()
     reference = mbs.systemData.GetODE2Coordinates(configuration=exu.ConfigurationType.Reference)
-    started = scene.model_copy(update={"initial": begun(placement.frames, q, v)})
+    started = scene.model_copy(update={"initial": begun(placement.frames, scene, q, v)})
     dependent = _dependent(exu, mbs) if any(loops(scene)) else 0
-    return Machine(
+    return ExudynSystem(
         started, system, mbs, container, clock, parts, gaps, exchanges, span(scene), np.array(reference), dependent
     )
 

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from shoal.engines.exudyn.bodies import Place
-from shoal.engines.exudyn.ends import Ends
+from shoal.engines.exudyn.ends import SystemAttachments
 from shoal.engines.exudyn.space.beam import SpatialBeamPart
-from shoal.engines.exudyn.space.bodies import Motion, Side, SpatialCablePart, SpatialGround, SpatialHolder
+from shoal.engines.exudyn.space.bodies import Side, SpatialCablePart, SpatialGround, SpatialHolder, SpatialPointMotion
 from shoal.engines.poses import owner
 from shoal.mechanics import rotation as turns
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
@@ -20,7 +20,7 @@ from shoal.trajectory import Array
 
 
 @dataclass(frozen=True)
-class SpatialEnds(Ends):
+class SpatialEnds(SystemAttachments):
     """Attachments of a scene in space. placement: of the native machine, whose start and whose axes these are."""
 
     placement: SpatialPlacement
@@ -53,10 +53,10 @@ class SpatialEnds(Ends):
         """The unit vector (3,) of an axis as it points at the start, in the frame of a body or of a rod's section."""
         return np.asarray(image(self.scene, self.placement.attitudes, at, axis)[:, 0])
 
-    def moved(self, at: Attachment, q: Array, v: Array) -> Motion:
+    def moved(self, at: Attachment, q: Array, v: Array) -> SpatialPointMotion:
         """Return the motion of an attachment."""
         part, place = self.part(at)
-        motion: Motion = part.motion(q, v, place)
+        motion: SpatialPointMotion = part.motion(q, v, place)
         return motion
 
     def start_distance(self, first: Attachment, second: Attachment) -> float:

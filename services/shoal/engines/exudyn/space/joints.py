@@ -1,4 +1,4 @@
-"""Joints in space inside Exudyn, condition by condition: what each locks, and how far it opens."""
+"""Joints in space as items of Exudyn: for each condition the items that impose it, and its residual along a motion."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from shoal.engines.exudyn import user
 from shoal.engines.exudyn.bodies import System
-from shoal.engines.exudyn.connectors import Exchange, Law, exchange_of
+from shoal.engines.exudyn.connectors import Exchange, ForceLaw, exchange_of
 from shoal.engines.exudyn.ground import driven
 from shoal.engines.exudyn.space.ends import SpatialEnds, frame_about
 from shoal.engines.exudyn.space.rows import Row, Toothed, add_rows, add_teeth, hold_node
@@ -22,12 +22,13 @@ from shoal.scene import JOINT_KINDS, Attachment, Joint, Revolute, Slider
 from shoal.trajectory import Array
 
 Gap = Callable[[Array, Array], Array]
+"""Residual of a condition [m or rad] at coordinates and rates (rows, unknowns), (rows,)."""
 
 SPATIAL_JOINTS = frozenset(JOINT_KINDS) - {"coupling"}
 
 
 def add_joint(exu: Any, ends: SpatialEnds, name: str, joint: Joint) -> list[Gap]:
-    """Enter a joint without its friction; how far each of its conditions is open. Raises InputError."""
+    """Add a joint without its friction; return the residuals of its conditions. Raises InputError."""
     ends.system.enter(f"joints.{name}")
     return [CONDITIONS[type(one)](exu, ends, f"joints.{name}", one) for one in conditions(joint, 3)]
 
@@ -37,7 +38,7 @@ def add_friction(ends: SpatialEnds, name: str, joint: Joint) -> Exchange | None:
     if not isinstance(joint, Revolute | Slider) or not joint.resists:
         return None
     ends.system.enter(f"joints.{name}.friction")
-    law = Law.of(joint)
+    law = ForceLaw.of(joint)
     if isinstance(joint, Revolute):
         return add_twist(ends, f"joints.{name}.friction", joint.first, joint.second, joint.axis, law, None)
     return _add_rail(ends, f"joints.{name}.friction", joint, law)
@@ -49,7 +50,7 @@ def add_twist(
     first: Attachment,
     second: Attachment,
     axis: Any,
-    law: Law,
+    law: ForceLaw,
     rest: float | None,
 ) -> Exchange:
     """Enter a law over the angle about an axis of two rigid bodies; rest: where it is 0 [rad], else at the start."""
@@ -95,7 +96,7 @@ def _angle(first: Array, second: Array) -> Array:
     return np.asarray(np.arctan2(np.sum(first[:, :, 1] * towards, 1), np.sum(first[:, :, 0] * towards, 1)))
 
 
-def _add_rail(ends: SpatialEnds, where: str, joint: Slider, law: Law) -> Exchange:
+def _add_rail(ends: SpatialEnds, where: str, joint: Slider, law: ForceLaw) -> Exchange:
     require_rigid(ends, where, joint.first)
     line = _line(ends, joint.first, joint.direction if joint.axis is None else joint.axis)
     ends.system.add(

@@ -10,7 +10,7 @@ import numpy as np
 from shoal.engines.capabilities import of_kind
 from shoal.engines.exudyn import user
 from shoal.engines.exudyn.chain import Chain, gauss
-from shoal.engines.exudyn.connectors import Exchange, Law, add_spring
+from shoal.engines.exudyn.connectors import Exchange, ForceLaw, add_spring
 from shoal.engines.exudyn.loads import scaled
 from shoal.engines.exudyn.space.ends import SpatialEnds, frame_about
 from shoal.engines.exudyn.space.joints import add_twist, require_rigid, spin
@@ -28,8 +28,8 @@ def add_load(ends: SpatialEnds, name: str, load: Load) -> Exchange:
     return enter(ends, f"loads.{name}", load)
 
 
-def _law(load: Spring | TorsionSpring) -> Law:
-    return Law(load.stiffness, load.cubic, load.damping, elastic=load.elastic)
+def _law(load: Spring | TorsionSpring) -> ForceLaw:
+    return ForceLaw(load.stiffness, load.cubic, load.damping, elastic=load.elastic)
 
 
 def _add_spring(ends: SpatialEnds, where: str, load: Spring) -> Exchange:

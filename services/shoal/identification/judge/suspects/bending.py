@@ -8,7 +8,7 @@ import numpy as np
 
 from shoal.errors import InputError
 from shoal.identification.forward import ForwardModel
-from shoal.identification.judge.suspects.candidate import Candidate
+from shoal.identification.judge.suspects.candidate import FaultHypothesis
 from shoal.identification.judge.suspects.size import size_of
 from shoal.identification.problem import Parameter
 from shoal.scene import Rod
@@ -21,7 +21,7 @@ _ELEMENTS, _FOR_ANGLES = 2, 3
 """The direction of a rod's end converges more slowly than its place."""
 
 
-def bending(model: ForwardModel) -> Iterator[Candidate]:
+def bending(model: ForwardModel) -> Iterator[FaultHypothesis]:
     """Young's modulus of each rigid rod that may bend."""
     scene = model.scene
     size = size_of(scene)
@@ -42,4 +42,4 @@ def bending(model: ForwardModel) -> Iterator[Candidate]:
             continue  # a place beside its axis, say, is one of a rigid rod only
         ways = np.reshape(probes, (-1, 1, 1))
         bases = np.full((len(probes), 1), np.inf)
-        yield Candidate(f"bending of {name}", "machine", (free,), (np.inf,), ways, bases, "inverse", bent)
+        yield FaultHypothesis(f"bending of {name}", "machine", (free,), (np.inf,), ways, bases, "inverse", bent)

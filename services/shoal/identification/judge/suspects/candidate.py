@@ -20,7 +20,7 @@ _NEAR = 1.04
 
 
 @dataclass(frozen=True)
-class Candidate:
+class FaultHypothesis:
     """Its name, its numbers as parameters, and their stated values, at which it is no fault (or infinite).
 
     probes: values whose effects are measured, (ways, effects, numbers): the residual is regressed on the effects of
@@ -58,7 +58,7 @@ class Candidate:
         alone: bool = False,
         factor: bool = False,
         own: tuple[str, ...] = (),
-    ) -> Candidate:
+    ) -> FaultHypothesis:
         """One number between bounds, whose effect is measured at one other value; own: of these recordings alone."""
         free = Parameter(path=path, lower=bounds[0], upper=bounds[1], scale=law, own=own or False)
         probes, bases = np.array([[[probe]]]), np.array([[stated]])
@@ -115,7 +115,7 @@ class Candidate:
         return value, f"a value of {value:.4g} instead of {known} {unit(self.parameters[0].path or '')}".rstrip()
 
 
-def with_parameters(model: ForwardModel, candidates: list[Candidate]) -> ForwardModel:
+def with_parameters(model: ForwardModel, candidates: list[FaultHypothesis]) -> ForwardModel:
     """The model with candidates of one and the same machine as further parameters, at the end."""
     more = {key: p for c in candidates for key, p in zip(c.keys, c.parameters, strict=True)}
     problem = model.problem.model_copy(update={"parameters": {**model.problem.parameters, **more}})

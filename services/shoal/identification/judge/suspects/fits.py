@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from shoal.identification.forward import ForwardModel
-from shoal.identification.judge.suspects.candidate import Candidate, with_parameters
+from shoal.identification.judge.suspects.candidate import FaultHypothesis, with_parameters
 from shoal.identification.methods.lanes import Descent, descend_each, difference_at
 from shoal.mechanics.numerics.tile import WIDE
 from shoal.trajectory import Array
@@ -19,9 +19,9 @@ _PATIENCE = 100.0
 """Of the best one's fitness: a fit that promises no more is given up."""
 
 
-def groups_of(candidates: Iterable[Candidate]) -> list[list[Candidate]]:
+def groups_of(candidates: Iterable[FaultHypothesis]) -> list[list[FaultHypothesis]]:
     """Candidates of one machine that can be freed beside each other."""
-    groups = dict[int, list[Candidate]]()
+    groups = dict[int, list[FaultHypothesis]]()
     for candidate in candidates:
         groups.setdefault(id(candidate if candidate.alone else candidate.scene), []).append(candidate)
     return list(groups.values())
@@ -32,7 +32,7 @@ class Together:
     """A model with all numbers of a group of candidates, of which each point changes those of one."""
 
     model: ForwardModel
-    group: list[Candidate]
+    group: list[FaultHypothesis]
 
     @cached_property
     def _union(self) -> ForwardModel:

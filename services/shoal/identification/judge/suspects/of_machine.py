@@ -10,7 +10,7 @@ import numpy as np
 
 from shoal.errors import InputError
 from shoal.identification.forward import ForwardModel
-from shoal.identification.judge.suspects.candidate import Candidate
+from shoal.identification.judge.suspects.candidate import FaultHypothesis
 from shoal.identification.judge.suspects.size import Size, size_of
 from shoal.identification.judge.suspects.springs import springs
 from shoal.identification.problem import Parameter
@@ -35,7 +35,7 @@ _NOTHING = 1e-6
 """Of the machine: a further mass that is none."""
 
 
-def of_machine(model: ForwardModel) -> Iterator[Candidate]:
+def of_machine(model: ForwardModel) -> Iterator[FaultHypothesis]:
     """The candidates of a model's scene."""
     scene = model.scene
     size = size_of(scene)
@@ -48,7 +48,7 @@ def of_machine(model: ForwardModel) -> Iterator[Candidate]:
     yield from _markers(model, size)
 
 
-def _friction(scene: Scene, size: Size) -> Iterator[Candidate]:
+def _friction(scene: Scene, size: Size) -> Iterator[FaultHypothesis]:
     """By every law, of each joint that has a place for it."""
     for name, joint in scene.joints.items():
         if isinstance(joint, Resisted):
@@ -56,7 +56,7 @@ def _friction(scene: Scene, size: Size) -> Iterator[Candidate]:
                 yield resisting(name, joint, field, size)
 
 
-def resisting(name: str, joint: Resisted, field: str, size: Size) -> Candidate:
+def resisting(name: str, joint: Resisted, field: str, size: Size) -> FaultHypothesis:
     """What a joint by name resists with by one of RESISTING."""
     turning = isinstance(joint, Revolute)
     force = size.mass * size.gravity * (size.length if turning else 1.0)
@@ -64,10 +64,10 @@ def resisting(name: str, joint: Resisted, field: str, size: Size) -> Candidate:
     upper = {"friction": force / rate, "drag": force / rate**2, "coulomb": 0.5 * force}[field]
     stated, path = float(getattr(joint, field)), f"joints.{name}.{field}"
     bounds = (0.0, max(upper, 4 * stated))
-    return Candidate.single(f"{RESISTING[field]} of {name}", path, stated, bounds, stated + _SLIGHT * upper)
+    return FaultHypothesis.single(f"{RESISTING[field]} of {name}", path, stated, bounds, stated + _SLIGHT * upper)
 
 
-def _masses(scene: Scene, size: Size) -> Iterator[Candidate]:
+def _masses(scene: Scene, size: Size) -> Iterator[FaultHypothesis]:
     """A further mass at each marker, and the mass of each body."""
     loaded, seen = scene.model_dump(mode="json"), dict[str, str]()
     kind = "spherical" if scene.dimensions == 3 else "revolute"
@@ -82,7 +82,7 @@ def _masses(scene: Scene, size: Size) -> Iterator[Candidate]:
         with_masses = Scene.parse(loaded)
         for name in seen:
             path, bounds = f"bodies.further-{name}.mass", (_NOTHING * size.mass, size.mass)
-            yield Candidate.single(f"mass at {name}", path, 0.0, bounds, _STEP * size.mass, scene=with_masses)
+            yield FaultHypothesis.single(f"mass at {name}", path, 0.0, bounds, _STEP * size.mass, scene=with_masses)
     for name, body in scene.bodies.items():
         if len(scene.bodies) == 1 and not (isinstance(body, RigidBody) and np.any(body.inertia)):
             continue  # all forces go with its mass, but for friction, which is a candidate itself
@@ -98,7 +98,7 @@ def _masses(scene: Scene, size: Size) -> Iterator[Candidate]:
                     yield _ratio(f"{'xyz'[axis]} of the centre of mass of {name}", path, where)
 
 
-def _lengths(scene: Scene) -> Iterator[Candidate]:
+def _lengths(scene: Scene) -> Iterator[FaultHypothesis]:
     for name, body in scene.bodies.items():
         if isinstance(body, Rod):
             yield _ratio(f"length of {name}", f"bodies.{name}.length", body.length)
@@ -110,14 +110,14 @@ def _lengths(scene: Scene) -> Iterator[Candidate]:
                     yield _ratio(words, f"bodies.{name}.named_points.{point}.{axis}", place[axis])
 
 
-def _ratio(name: str, path: str, stated: float) -> Candidate:
+def _ratio(name: str, path: str, stated: float) -> FaultHypothesis:
     """A number known to within a factor."""
     lower, upper = sorted((stated / _FACTORS, stated * _FACTORS))
     law: Literal["log", "linear"] = "log" if stated > 0 else "linear"
-    return Candidate.single(name, path, stated, (lower, upper), stated * (1 + _STEP), law=law, factor=True)
+    return FaultHypothesis.single(name, path, stated, (lower, upper), stated * (1 + _STEP), law=law, factor=True)
 
 
-def _pivots(scene: Scene, size: Size) -> Iterator[Candidate]:
+def _pivots(scene: Scene, size: Size) -> Iterator[FaultHypothesis]:
     """Places on the ground; where there is only one, a shift of it is one of the camera."""
     places = {
         (name, field): side.point
@@ -133,7 +133,7 @@ def _pivots(scene: Scene, size: Size) -> Iterator[Candidate]:
     yield from _joints_on_bodies(scene)
 
 
-def _joints_on_bodies(scene: Scene) -> Iterator[Candidate]:
+def _joints_on_bodies(scene: Scene) -> Iterator[FaultHypothesis]:
     """Places of joints on rigid rods, along the rod."""
     explicit, found = scene.model_dump(mode="json"), list[tuple[str, str, float, float]]()
     for name, joint in scene.joints.items():
@@ -152,10 +152,10 @@ def _joints_on_bodies(scene: Scene) -> Iterator[Candidate]:
             yield _near(words, f"joints.{name}.{field}.point.0", along, _SHIFT * length, stated)
 
 
-def _near(name: str, path: str, stated: float, width: float, scene: Scene | None = None) -> Candidate:
+def _near(name: str, path: str, stated: float, width: float, scene: Scene | None = None) -> FaultHypothesis:
     """A number known to within a width."""
     bounds = (stated - width, stated + width)
-    return Candidate.single(name, path, stated, bounds, stated + _STEP * width, scene=scene)
+    return FaultHypothesis.single(name, path, stated, bounds, stated + _STEP * width, scene=scene)
 
 
 def _positions(model: ForwardModel) -> list[str]:
@@ -165,7 +165,7 @@ def _positions(model: ForwardModel) -> list[str]:
     return [name for name in model.scene.markers if name in seen]
 
 
-def _markers(model: ForwardModel, size: Size) -> Iterator[Candidate]:
+def _markers(model: ForwardModel, size: Size) -> Iterator[FaultHypothesis]:
     """Places on their rigid bodies of markers whose positions are measured."""
     explicit, found = model.scene.model_dump(mode="json"), dict[str, tuple[float, ...]]()
     for name in _positions(model):
@@ -180,7 +180,7 @@ def _markers(model: ForwardModel, size: Size) -> Iterator[Candidate]:
             yield _marker(name, place, size.length, scene)
 
 
-def _marker(name: str, place: tuple[float, ...], width: float, scene: Scene) -> Candidate:
+def _marker(name: str, place: tuple[float, ...], width: float, scene: Scene) -> FaultHypothesis:
     """The place of one marker, all of its coordinates."""
     paths = [f"markers.{name}.point.{axis}" for axis in range(len(place))]
     both = zip(paths, place, strict=True)
@@ -197,10 +197,10 @@ def _marker(name: str, place: tuple[float, ...], width: float, scene: Scene) -> 
         known = f", about that of {nearest}," if off[nearest] < _ABOUT * np.linalg.norm(values - place) else ""
         return float(np.linalg.norm(values - place)), f"a value of ({there}) m{known} instead of ({stated}) m"
 
-    return Candidate(words, "machine", numbers, place, probes, base, scene=scene, tell=tell)
+    return FaultHypothesis(words, "machine", numbers, place, probes, base, scene=scene, tell=tell)
 
 
-def _rates(scene: Scene, size: Size) -> Iterator[Candidate]:
+def _rates(scene: Scene, size: Size) -> Iterator[FaultHypothesis]:
     """Rates at the start; in a closed loop of what stands on the ground only, as those of others follow."""
     if scene.dimensions == 3:
         yield from _spins(scene, size)
@@ -213,13 +213,13 @@ def _rates(scene: Scene, size: Size) -> Iterator[Candidate]:
             continue
         rate, most = scene.start(name).rate, 10.0 * size.rate
         words, path, bounds = f"rate of {name} at the start", f"initial.{name}.rate", (rate - most, rate + most)
-        yield Candidate.single(words, path, rate, bounds, rate + _STEP * size.rate, alone=not direct)
+        yield FaultHypothesis.single(words, path, rate, bounds, rate + _STEP * size.rate, alone=not direct)
 
 
-def _spins(scene: Scene, size: Size) -> Iterator[Candidate]:
+def _spins(scene: Scene, size: Size) -> Iterator[FaultHypothesis]:
     """Components of the angular velocities that a scene in space states."""
     for name in scene.bodies:
         for axis, rate in enumerate(scene.start(name).spin or ()):
             words, path, most = f"spin of {name} about {'xyz'[axis]} at the start", f"initial.{name}.spin.{axis}", 10.0
             bounds = (rate - most * size.rate, rate + most * size.rate)
-            yield Candidate.single(words, path, rate, bounds, rate + _STEP * size.rate)
+            yield FaultHypothesis.single(words, path, rate, bounds, rate + _STEP * size.rate)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from shoal.identification.forward import ForwardModel
-from shoal.identification.judge.suspects.candidate import Candidate
+from shoal.identification.judge.suspects.candidate import FaultHypothesis
 from shoal.identification.problem import RESERVED, Parameter
 from shoal.identification.recording.measurement import Recording
 
@@ -34,7 +34,7 @@ _SENSORS = {
 """Of inertial sensors: the quantities that show a fault, and how large it may be [rad, m/s^2, rad/s]."""
 
 
-def of_measurement(model: ForwardModel) -> Iterator[Candidate]:
+def of_measurement(model: ForwardModel) -> Iterator[FaultHypothesis]:
     """The candidates of a model's recordings, of all by what the first one states, then of each by itself."""
     runs = model.measurement.recordings
     yield from _of(list(runs.values()))
@@ -45,10 +45,12 @@ def of_measurement(model: ForwardModel) -> Iterator[Candidate]:
         size = model.scene.gravity[axes[0]]
         lower, upper = sorted((size / _FACTORS, size * _FACTORS))
         probe = size * (1 + _STEP)
-        yield Candidate.single("gravity", f"gravity.{axes[0]}", size, (lower, upper), probe, "measurement", factor=True)
+        yield FaultHypothesis.single(
+            "gravity", f"gravity.{axes[0]}", size, (lower, upper), probe, "measurement", factor=True
+        )
 
 
-def _of(runs: list[Recording], name: str | None = None) -> Iterator[Candidate]:
+def _of(runs: list[Recording], name: str | None = None) -> Iterator[FaultHypothesis]:
     """What recordings state, by the first one; name: of the only one, whose own it then is."""
     first, channels = runs[0], [channel for run in runs for channel in run.channels]
     own, of = ((), "") if name is None else ((name,), f" of recording {name}")
@@ -59,7 +61,9 @@ def _of(runs: list[Recording], name: str | None = None) -> Iterator[Candidate]:
         stated = float(getattr(first.stated, field))
         bounds, probe = (stated / _FACTORS, stated * _FACTORS), stated * (1 + _STEP)
         path = f"{RESERVED}.{field}"
-        yield Candidate.single(field + of, path, stated, bounds, probe, "measurement", law="log", factor=True, own=own)
+        yield FaultHypothesis.single(
+            field + of, path, stated, bounds, probe, "measurement", law="log", factor=True, own=own
+        )
     shifts = {"tilt": np.pi / 2} | ({"x": reach, "y": reach} if positions else {})
     shifts |= {
         field: size for field, (quantities, size) in _SENSORS.items() if quantities & {c.quantity for c in channels}
@@ -67,11 +71,11 @@ def _of(runs: list[Recording], name: str | None = None) -> Iterator[Candidate]:
     for field, width in shifts.items():
         stated = float(getattr(first.stated, field))
         bounds, probe = (stated - width, stated + width), stated + _STEP * width
-        yield Candidate.single(field + of, f"{RESERVED}.{field}", stated, bounds, probe, "measurement", own=own)
+        yield FaultHypothesis.single(field + of, f"{RESERVED}.{field}", stated, bounds, probe, "measurement", own=own)
     yield _delay(f"delay{of}", first.stated.delay, end, own)
 
 
-def _delay(name: str, stated: float, end: float, own: tuple[str, ...]) -> Candidate:
+def _delay(name: str, stated: float, end: float, own: tuple[str, ...]) -> FaultHypothesis:
     """Late after the release, or held before it.
 
     Of a short hold the parameters follow all but a kink, which no derivative shows: several holds are tried.
@@ -81,4 +85,4 @@ def _delay(name: str, stated: float, end: float, own: tuple[str, ...]) -> Candid
     held = end * np.geomspace(_SHORTEST, _EARLY, _HOLDS)
     probes = np.append(stated + _STEP * end, stated - held).reshape(-1, 1, 1)
     bases = np.full((len(probes), 1), stated)
-    return Candidate(name, "measurement", (free,), (stated,), probes, bases)
+    return FaultHypothesis(name, "measurement", (free,), (stated,), probes, bases)

@@ -18,7 +18,7 @@ from shoal.identification.deadline import TimeIsUp
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.hypotheses import Hypothesis, ScoreTest, table
 from shoal.identification.judge.suspects.bending import bending
-from shoal.identification.judge.suspects.candidate import Candidate
+from shoal.identification.judge.suspects.candidate import FaultHypothesis
 from shoal.identification.judge.suspects.fits import Together, groups_of
 from shoal.identification.judge.suspects.of_bounds import at_bound, told, without_bounds
 from shoal.identification.judge.suspects.of_data import Reading, misfit, of_data
@@ -67,7 +67,7 @@ _SMALL = 3.0
 
 
 @dataclass(frozen=True)
-class Findings:
+class FaultSearch:
     """The suspects, those that explain most first, and by name and kind the fits of those that free numbers.
 
     better: a minimum of the model itself that fits better, if met; cut: whether time was up before all were tried
@@ -95,7 +95,7 @@ class _Scored:
     effect: Array
 
     @property
-    def candidate(self) -> Candidate:
+    def candidate(self) -> FaultHypothesis:
         return self.together.group[self.number]
 
 
@@ -108,14 +108,14 @@ def suspects(
     *,
     test: ScoreTest | None = None,
     misfit: bool = True,
-) -> Findings:
+) -> FaultSearch:
     """Return what explains the residual at an answer, the best first. Runs are not counted.
 
     noise: what no explanation can go below [RMS]; test: of the hypotheses, that of a model without error by default
     misfit: whether the residual is more than noise; else only what a score test finds is fitted
     Past the model's deadline it ends with what was found until then.
     """
-    search = _Search(model, point, residual, jacobian, noise, test or ScoreTest.of(model, residual, jacobian))
+    search = _FaultSearch(model, point, residual, jacobian, noise, test or ScoreTest.of(model, residual, jacobian))
     cut = True
     with suppress(TimeIsUp):
         search.run(misfit)
@@ -127,10 +127,10 @@ def suspects(
     listed = [suspect for suspect in found if suspect.after <= _FAR * found[0].after]
     refits = {(s.name, s.kind): search.refits[s.name, s.kind] for s in listed if (s.name, s.kind) in search.refits}
     named = [replace(s, alike=search.alike(s.name)) for s in listed]
-    return Findings(named, refits, search.better, cut, search.hypotheses)
+    return FaultSearch(named, refits, search.better, cut, search.hypotheses)
 
 
-class _Search:
+class _FaultSearch:
     """One search, whose finds stay when its time is up."""
 
     def __init__(
@@ -147,7 +147,7 @@ class _Search:
         self.effects: dict[str, Array] = {}
         self.measured: dict[tuple[str, str, int], list[Array]] = {}
         self.ends: list[tuple[float, Array]] = []
-        self.unfinished: list[tuple[float, Candidate, Array]] = []
+        self.unfinished: list[tuple[float, FaultHypothesis, Array]] = []
         self.better: Descent | None = None
 
     @property
@@ -189,7 +189,7 @@ class _Search:
             self._follow()
         self._look_back()
 
-    def _groups(self, candidates: list[Candidate]) -> list[Together]:
+    def _groups(self, candidates: list[FaultHypothesis]) -> list[Together]:
         """The candidates that are not sought themselves, those of one machine together."""
         sought = {*self.model.parameters.paths, *self.model.problem.ties}
         return [Together(self.model, group) for group in groups_of(c for c in candidates if not c.paths & sought)]
@@ -203,7 +203,7 @@ class _Search:
             if self._explained:
                 break
 
-    def _promising(self, candidates: list[Candidate]) -> list[_Scored]:
+    def _promising(self, candidates: list[FaultHypothesis]) -> list[_Scored]:
         """Those that promise something, the best first."""
         return sorted((s for group in self._groups(candidates) for s in self._scored(group)), key=lambda s: s.promise)
 
@@ -323,7 +323,7 @@ class _Search:
         for _, candidate, point in [entry for entry in begun if entry[0] <= _FAR * self._least][:_FOLLOWED]:
             self._keep(candidate, *descend_many(candidate.freed(self.model), point[None]))
 
-    def _keep(self, candidate: Candidate, end: Descent) -> None:
+    def _keep(self, candidate: FaultHypothesis, end: Descent) -> None:
         """Note where a fit ended, and the suspect that it makes if it explains the misfit."""
         known, after = len(self.point), misfit(end.residual)
         free = candidate.freed(self.model)

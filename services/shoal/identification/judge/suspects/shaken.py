@@ -13,7 +13,7 @@ import numpy as np
 
 from shoal.errors import InputError
 from shoal.identification.forward import ForwardModel
-from shoal.identification.judge.suspects.candidate import Candidate
+from shoal.identification.judge.suspects.candidate import FaultHypothesis
 from shoal.identification.judge.suspects.size import Size, size_of
 from shoal.identification.problem import Parameter
 from shoal.scene import Scene
@@ -34,7 +34,7 @@ _MOST = 0.2
 _BLOCK = "shaken-block"
 
 
-def shaken(model: ForwardModel) -> Iterator[Candidate]:
+def shaken(model: ForwardModel) -> Iterator[FaultHypothesis]:
     """The motion along either axis of each pivot on the ground."""
     scene = model.scene
     size = size_of(scene)
@@ -76,7 +76,9 @@ def _on_a_block(scene: Scene, joint: str, side: str, axis: int, size: Size) -> S
     return Scene.parse(data, scene.name)
 
 
-def _candidate(joint: str, axis: int, place: tuple[float, float], scene: Scene, size: Size, end: float) -> Candidate:
+def _candidate(
+    joint: str, axis: int, place: tuple[float, float], scene: Scene, size: Size, end: float
+) -> FaultHypothesis:
     mass, stated, most = _HEAVY * size.mass, place[axis], _MOST * size.length
     count = 2 + int((_FASTEST - _SLOWEST) * size.rate * end / _APART)
     rates = size.rate * np.linspace(_SLOWEST, _FASTEST, min(count, _MOST_WAYS))
@@ -93,7 +95,7 @@ def _candidate(joint: str, axis: int, place: tuple[float, float], scene: Scene, 
     probes = np.array([[[stated + step, 0.0, k], [stated, step * rate, k]] for k, rate in ways])
     name, values = f"motion of the pivot {joint} along {'xy'[axis]}", (stated, 0.0, float(stiffness[0]))
     tell = partial(_told, stated, mass)
-    return Candidate(name, "machine", parameters, values, probes, bases, scene=scene, tell=tell)
+    return FaultHypothesis(name, "machine", parameters, values, probes, bases, scene=scene, tell=tell)
 
 
 def _told(stated: float, mass: float, values: Array) -> tuple[float, str]:

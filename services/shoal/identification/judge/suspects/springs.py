@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from shoal.errors import InputError
-from shoal.identification.judge.suspects.candidate import Candidate
+from shoal.identification.judge.suspects.candidate import FaultHypothesis
 from shoal.identification.judge.suspects.size import Size
 from shoal.identification.problem import Parameter
 from shoal.scene import GROUND, PointMass, Revolute, Scene
@@ -23,7 +23,7 @@ _LARGEST = 10.0
 """Times the torque of the machine's weight, for each radian."""
 
 
-def springs(scene: Scene, size: Size) -> Iterator[Candidate]:
+def springs(scene: Scene, size: Size) -> Iterator[FaultHypothesis]:
     """A spring in each hinge that has none: its stiffness, and its torque where both directions are the same."""
     sprung, hinges = scene.model_dump(mode="json"), list[str]()
     held = {
@@ -53,7 +53,7 @@ def _loads(name: str, joint: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def _candidate(name: str, size: Size, scene: Scene) -> Candidate:
+def _candidate(name: str, size: Size, scene: Scene) -> FaultHypothesis:
     most = _LARGEST * size.mass * size.gravity * size.length
     numbers = (
         Parameter(path=f"loads.further-spring-{name}.stiffness", lower=0.0, upper=most),
@@ -68,4 +68,4 @@ def _candidate(name: str, size: Size, scene: Scene) -> Candidate:
         return stiffness, f"a stiffness of {stiffness:.3g} N m/rad, at rest at {torque / stiffness:.3g} rad"
 
     words = f"torsion spring in {name}"
-    return Candidate(words, "machine", numbers, (0.0, 0.0), probes, np.zeros((1, 2)), scene=scene, tell=tell)
+    return FaultHypothesis(words, "machine", numbers, (0.0, 0.0), probes, np.zeros((1, 2)), scene=scene, tell=tell)

@@ -27,7 +27,7 @@ class Attitudes:
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
-        self._begin = self._told()
+        self._begin = self._rotations()
         self.kept = Orientations(directors={GROUND: tuple(fixed(axis) for axis in np.eye(3)[..., None])}, dimensions=3)
         for name, condition in joints.of_scene(scene):
             if isinstance(condition, Turned):
@@ -78,7 +78,7 @@ class Attitudes:
             return None
         return vector(*start.spin) if start.spin is not None else vector(0.0, 0.0, start.rate)
 
-    def _told(self) -> dict[str, Array]:
+    def _rotations(self) -> dict[str, Array]:
         """Return the rotation of every body: stated, or that of a neighbour plus the angle of their joint, or none."""
         none = np.eye(3)[..., None]
         found = {body: stated for body in self._scene.bodies if (stated := self.stated(body)) is not None}

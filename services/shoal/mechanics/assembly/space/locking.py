@@ -2,7 +2,7 @@
 
 Axes that are to be parallel and differ in the sixth digit leave a linkage no freedom. What holds it is a row of the
 constraints that nearly depends on others. It does so near a singular position as well; but there the dependence ends a
-short way on, while a rounded machine keeps it wherever it would go. A short lever keeps it as well: it is one where the
+short way on, while a rounded machine keeps it in all positions. A short lever keeps it as well: it is one where the
 dependence is large for the digits of the numbers.
 """
 
@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from shoal.errors import InputError
-from shoal.mechanics.assembly.space.values import uncancelled
+from shoal.mechanics.numerics.newton import newton
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.term_values import TermValues
 from shoal.mechanics.terms import Term
@@ -34,7 +34,6 @@ _WAY = 0.05
 """How far the machine is taken along the motion that is nearly free; a director has unit length."""
 _SAME = 10.0
 """The joints may gape there by so many times what they do to first order."""
-_ITERATIONS = 20
 _SHARE = 1e-3
 """Part in a dependence, squared, from which a row counts as one of those that make it."""
 
@@ -43,7 +42,7 @@ def require_unlocked(scene: Scene, terms: Sequence[Term], q: Array) -> None:
     """Raises InputError where constraints forbid a motion at the coordinates q, (unknowns,), by rounding only."""
     if not terms or len(q) >= LARGEST:
         return
-    length = np.array([uncancelled(term, q) for term in terms])
+    length = np.array([_uncancelled(term, q) for term in terms])
     values = TermValues(terms, 3).of_lane(0)
 
     def gap(q: Array) -> Array:
@@ -61,6 +60,15 @@ def require_unlocked(scene: Scene, terms: Sequence[Term], q: Array) -> None:
             f"joints.{first}: {beside} forbids a motion by {found.off:.1g} rad, as rounded axes, rotations or places "
             "do; state them with more digits"
         )
+
+
+def _uncancelled(term: Term, q: Array) -> float:
+    """The length that the row of a constraint would have in the first lane if nothing in it were at right angles."""
+    u, w = (vector.at(q) for vector in (term.u, term.w))
+    squares = 0.0
+    for vector, other in ((term.u, term.form @ w), (term.w, term.form.T @ u)):
+        squares += float(np.sum(vector.by_lane[1][0] ** 2) * (other @ other))
+    return float(np.sqrt(squares)) + 1e-300
 
 
 def joints_of(scene: Scene, names: Collection[str]) -> tuple[str, ...]:
@@ -101,7 +109,7 @@ def lock(gap: Callable[[Array], Array], slope: Callable[[Array], Array], q: Arra
     """
     left, sizes, right = np.linalg.svd(slope(q), full_matrices=False)
     for k in np.flatnonzero((sizes > LEAST) & (sizes < MOST))[::-1]:
-        there = _followed(gap, slope, q + _WAY * right[k])
+        there = _closed(gap, slope, q + _WAY * right[k])
         gapes = float(np.max(np.abs(gap(there))))
         depends = np.any(np.linalg.svd(slope(there), compute_uv=False) < _SAME * sizes[k])
         moved = float(np.linalg.norm(there - q))
@@ -110,11 +118,11 @@ def lock(gap: Callable[[Array], Array], slope: Callable[[Array], Array], q: Arra
     return None
 
 
-def _followed(gap: Callable[[Array], Array], slope: Callable[[Array], Array], q: Array) -> Array:
-    """Near q, where all closes but what nearly depends on the rest (Gauss and Newton's method)."""
-    for _ in range(_ITERATIONS):
-        move = np.linalg.lstsq(slope(q), -gap(q), MOST)[0]
-        q = q + move
-        if float(np.max(np.abs(move))) < LEAST:
-            break
-    return q
+def _closed(gap: Callable[[Array], Array], slope: Callable[[Array], Array], q: Array) -> Array:
+    """Return coordinates near q that meet all constraints but those that nearly depend on others (Gauss-Newton)."""
+
+    def correct(q: Array) -> tuple[Array, float]:
+        move = np.asarray(np.linalg.lstsq(slope(q), -gap(q), MOST)[0], dtype=float)
+        return move, float(np.max(np.abs(move)))
+
+    return newton(correct, q, close=LEAST).point

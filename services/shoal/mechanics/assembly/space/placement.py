@@ -9,7 +9,7 @@ Garcia de Jalon and Bayo, Kinematic and dynamic simulation of multibody systems,
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import combinations_with_replacement
 
@@ -18,10 +18,9 @@ import numpy as np
 from shoal.mechanics import joints, reach
 from shoal.mechanics import rotation as turns
 from shoal.mechanics.affine import Affine, combined, fixed
+from shoal.mechanics.assembly.coordinates import Pose, arm
 from shoal.mechanics.assembly.groups import JointPoint, is_stiff, rotated, transposed
-from shoal.mechanics.assembly.holding import hold
-from shoal.mechanics.assembly.order import next_body, place_driver, place_point
-from shoal.mechanics.assembly.pose import Pose, arm
+from shoal.mechanics.assembly.placing import hold, next_body, place_driver, place_point
 from shoal.mechanics.assembly.space.axes import JointAxis
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
 from shoal.mechanics.assembly.space.hinges import make_axes
@@ -38,8 +37,12 @@ APART = 0.3
 """Sine of the angle between a vector and the span of those chosen before it, from which it is chosen too."""
 
 
-def place_in_space(scene: Scene) -> SpatialPlacement:
-    """Give every body its coordinates and a state that joints need not agree with yet. Raises InputError."""
+def place_in_space(scene: Scene, poses: Mapping[str, tuple[Array, Array]] | None = None) -> SpatialPlacement:
+    """Give every body its coordinates and a state that joints need not agree with yet. Raises InputError.
+
+    poses: places [m], (3, lanes), and axes as columns, (3, 3, lanes), of bodies, by default along the joints. Axes of
+    joints are those of the stated attitudes
+    """
     result = SpatialPlacement(scene)
     for name, path in scene.ground_points.items():
         place_driver(name, (path.x, path.y, path.z), result.points, result)
@@ -48,7 +51,7 @@ def place_in_space(scene: Scene) -> SpatialPlacement:
     while waiting:
         name = next_body(scene, waiting, touching, lambda one: next(_guides(scene, one, result), None) is not None)
         waiting.remove(name)
-        pose = _pose(scene, name, touching[name], result)
+        pose = _pose(scene, name, touching[name], result, poses)
         result.poses[name] = pose
         body = scene.bodies[name]
         if isinstance(body, PointMass):
@@ -74,8 +77,16 @@ def place_in_space(scene: Scene) -> SpatialPlacement:
     return result
 
 
-def _pose(scene: Scene, name: str, mine: list[JointPoint], result: SpatialPlacement) -> Pose:
+def _pose(
+    scene: Scene,
+    name: str,
+    mine: list[JointPoint],
+    result: SpatialPlacement,
+    poses: Mapping[str, tuple[Array, Array]] | None,
+) -> Pose:
     rotation, spin = result.attitudes.rotation(name), result.attitudes.spin(name)
+    if poses is not None:
+        rotation = poses[name][1]
     directors = rotation.transpose(1, 0, 2)
     turning = np.stack([turns.cross(spin, director) for director in directors])
     start = scene.start(name)
@@ -94,7 +105,8 @@ def _pose(scene: Scene, name: str, mine: list[JointPoint], result: SpatialPlacem
     else:
         position, velocity, p = _rail(scene, name, result)
     p = material(scene, name, p)
-    return Pose(position - arm(directors, p), directors, velocity - arm(turning, p), turning)
+    origin = position - arm(directors, p) if poses is None else poses[name][0]
+    return Pose(origin, directors, velocity - arm(turning, p), turning)
 
 
 def _rail(scene: Scene, name: str, result: SpatialPlacement) -> tuple[Array, Array, Place]:
@@ -128,7 +140,7 @@ def _place_rigid(name: str, mine: list[JointPoint], pose: Pose, result: SpatialP
     others = [point for point in mine if point is not anchor]
     if root not in kept.directors:
         hinge = next((axis for axis in axes if axis.where is not None and not axis.where.terms), None)
-        body = _Rigid(name, pose, where, p, result)
+        body = _DirectorVectors(name, pose, where, p, result)
         own = body.free(axes, others) if hinge is None else body.hinged(hinge, others)
         kept.directors[root] = rotated(own, transposed(relative))
     directors = kept.of_body(name)
@@ -147,7 +159,7 @@ def _place_rigid(name: str, mine: list[JointPoint], pose: Pose, result: SpatialP
         axis.holders.add(name)
 
 
-class _Rigid:
+class _DirectorVectors:
     """The directors of one body from vectors that it shares or makes."""
 
     def __init__(self, name: str, pose: Pose, where: Affine, p: Place, result: SpatialPlacement) -> None:

@@ -7,9 +7,12 @@ from typing import Any
 import numpy as np
 
 from shoal.mechanics import plane
+from shoal.mechanics import rotation as turns
 from shoal.mechanics.affine import Affine, fixed
-from shoal.mechanics.assembly.space.attitudes import Attitudes
+from shoal.mechanics.assembly.groups import transposed
+from shoal.mechanics.assembly.space.attitudes import Attitudes, section
 from shoal.mechanics.assembly.space.body_vectors import AttitudeVectors
+from shoal.mechanics.assembly.space.sections import material
 from shoal.mechanics.joints import Hinged, Turned
 from shoal.mechanics.start.rigid_bodies import DIRECTION, PLACE, Mark, RigidBodies, value_of
 from shoal.scene import GROUND, Attachment, Scene
@@ -36,21 +39,26 @@ class SpatialBodies(AttitudeVectors, RigidBodies):
         self.terms.dot(name, across, towards, 0, begin, condition.angle.through("neg"))
 
     def keep_angle(self, name: str, condition: Turned) -> None:
-        """Require the rotation between both bodies of the start: three products of axes at right angles."""
+        """Require the stated rotation, else that of the start: three products of axes at right angles."""
         first, second = condition.first, condition.second
         if {first.body, second.body} & self.points:
             return
-        kept = np.einsum("jil,jkl->ikl", *(self.attitudes.rotation(side.body) for side in (second, first)))
+        if condition.angle is None:
+            kept = np.einsum("jil,jkl->ikl", *(self.attitudes.rotation(side.body) for side in (second, first)))
+        else:
+            here, there = (section(self.scene, side) for side in (first, second))
+            turn = turns.about_z(-np.asarray(condition.angle))
+            kept = turns.product(there, turns.product(turn, transposed(here)))
         for k in range(3):
             own, other = np.eye(3)[k][:, None], kept[:, (k + 1) % 3]
             self.terms.dot(name, self.of_image(first, own), self.of_image(second, other), 0)
 
     def mark(self, at: Attachment, kind: int) -> Mark:
-        """Return the vector of a body at an attachment: its place, or its x axis."""
+        """Return the vector of a body at an attachment: its place, or the x axis of the section there."""
         if at.body == GROUND:
             return super().mark(at, kind)
         if kind == PLACE:
-            place = plane.vector(*self.scene.location(at))
-            return Mark(self.body(at), PLACE, place, 0.0 * place)
-        axis = np.eye(3)[0][:, None]
-        return Mark(self.body(at), DIRECTION, axis, 0.0 * axis)
+            found = plane.vector(*material(self.scene, at.body, self.scene.location(at)))
+        else:
+            found = section(self.scene, at)[:, 0]
+        return Mark(self.body(at), kind, found, 0.0 * found)

@@ -8,8 +8,8 @@ from shoal.errors import InputError
 from shoal.mechanics import joints
 from shoal.mechanics import rotation as turns
 from shoal.mechanics.affine import Affine, fixed
+from shoal.mechanics.assembly.coordinates import Pose, arm
 from shoal.mechanics.assembly.groups import JointPoint
-from shoal.mechanics.assembly.pose import Pose, arm
 from shoal.mechanics.assembly.rods import FIT, joint_nodes, node_of, require_fit
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
 from shoal.mechanics.assembly.space.sections import ALIGNED, arc, material

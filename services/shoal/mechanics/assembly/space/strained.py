@@ -14,8 +14,8 @@ import numpy as np
 
 from shoal.mechanics import joints
 from shoal.mechanics import rotation as turns
+from shoal.mechanics.assembly.coordinates import Pose
 from shoal.mechanics.assembly.groups import transposed
-from shoal.mechanics.assembly.pose import Pose
 from shoal.mechanics.assembly.rods import node_of
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
 from shoal.mechanics.assembly.space.sections import arc, flexible, material, turn_of
@@ -27,7 +27,7 @@ from shoal.scene import Attachment, Rod, Scene
 _NONE = np.eye(3)[..., None]
 
 
-class Guess(NamedTuple):
+class NodeGuess(NamedTuple):
     """A node's place [m], (3, lanes), and the rotation of its section from the unstrained start, (3, 3, lanes)."""
 
     place: Array
@@ -36,7 +36,7 @@ class Guess(NamedTuple):
 
 def guessed(
     scene: Scene, name: str, rod: Rod, pose: Pose, places: dict[int, Array], result: SpatialPlacement
-) -> list[Guess]:
+) -> list[NodeGuess]:
     """The nodes of a rod in their order. places: of nodes that joints hold at places known already [m], (3, lanes)."""
     sections = _held_sections(scene, name, rod, result)
     only = next(iter(sections.values()), _NONE) if len(places) < 2 else _NONE
@@ -48,7 +48,7 @@ def guessed(
     for node in nodes:
         near = held[0] if node <= held[0] else held[-1]
         turn = sections.get(near, only)
-        found[node] = Guess(places[near] + turns.turned(turn, plain[node] - plain[near]), turn)
+        found[node] = NodeGuess(places[near] + turns.turned(turn, plain[node] - plain[near]), turn)
     axes = transposed(pose.directors)
     for first, last in pairwise(held):
         between = range(first, last + 1)
@@ -70,7 +70,7 @@ def guessed(
             side = turns.turned(turn, frame[:, soft]) * bulge
             place = plain[node] + shift + side * np.sin(np.pi * part) ** 2
             slope = frame[:, 0] + slope + side * (np.pi / length * np.sin(2 * np.pi * part))
-            found[node] = Guess(place, _aligned(turn, frame[:, 0], slope))
+            found[node] = NodeGuess(place, _aligned(turn, frame[:, 0], slope))
     return [found[node] for node in nodes]
 
 

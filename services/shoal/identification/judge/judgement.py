@@ -1,14 +1,16 @@
-"""The verdict: what the evidence allows to say about an answer, why, and what to do next."""
+"""Judge an answer: the findings of all diagnostics, from which its verdict follows."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from enum import StrEnum
 
 import numpy as np
 
+from shoal.findings import Finding
+from shoal.identification import findings as kinds
 from shoal.identification.deadline import TimeIsUp, unless_late
+from shoal.identification.findings import Verdict, verdict_of
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.exchanged import exchanged
 from shoal.identification.judge.hypotheses import Hypothesis, ScoreTest
@@ -17,7 +19,7 @@ from shoal.identification.judge.residual_tests import ResidualTests, residual_te
 from shoal.identification.judge.rivals import ALIAS, relation, rivals_of, within
 from shoal.identification.judge.stationarity import downhill, sentence
 from shoal.identification.judge.stretch import odd_stretch
-from shoal.identification.judge.suspects import Findings, Suspect, suspects
+from shoal.identification.judge.suspects import FaultSearch, Suspect, suspects
 from shoal.identification.methods.growth import LARGE, growth
 from shoal.identification.methods.lanes import Descent
 from shoal.identification.methods.outcome import Outcome
@@ -40,38 +42,26 @@ _OTHERS = 3
 """Suspects that explain less than the best, and are named beside it."""
 
 
-class Verdict(StrEnum):
-    """What may be made of an estimate. Only the first two are answers."""
-
-    IDENTIFIED = "identified"
-    COMBINATION = "identified up to a combination"
-    AMBIGUOUS = "ambiguous"
-    REJECTED = "model rejected"
-    UNFINISHED = "not at a minimum"
-    FAILED = "failed"
-
-    @property
-    def trusted(self) -> bool:
-        """Return whether the answer can be used."""
-        return self in (Verdict.IDENTIFIED, Verdict.COMBINATION)
-
-
 @dataclass(frozen=True)
 class Judgement:
-    """The verdict, why, what to do next, and what would explain a misfit.
+    """What the diagnostics found about an answer.
 
+    suspects: what was taken as known and would lower a misfit if it were freed, the best first
     refits: fits with what would explain a misfit that is not held against the model; the intervals hold them too
-    hypotheses: the score tests of what was taken as known, the most significant first
     better: a minimum that fits better, if the search for suspects met one: go on from there
+    hypotheses: the score tests of what was taken as known, the most significant first
     """
 
-    verdict: Verdict
-    message: str = ""
-    advice: list[str] = field(default_factory=list)
+    findings: list[Finding] = field(default_factory=list)
     suspects: list[Suspect] = field(default_factory=list)
     refits: list[Refit] = field(default_factory=list)
     better: Descent | None = None
     hypotheses: list[Hypothesis] = field(default_factory=list)
+
+    @property
+    def verdict(self) -> Verdict:
+        """The worst verdict that the findings imply."""
+        return verdict_of(self.findings)
 
 
 def judge(
@@ -89,26 +79,24 @@ def judge(
     seen, at, tests: derivatives, linearisation and residual tests there; test: of what was taken as known
     """
     if not outcome.ended:
-        advice = ["allow more time, or start from a better place"]
-        return Judgement(Verdict.FAILED, outcome.message or "the method did not come to its end", advice)
+        return Judgement([kinds.STOPPED.found(outcome.message or "the method did not come to its end")])
     if few(model):
         reason = f"{tests.rows} measured numbers for {len(parameters)} unknown: too few to tell how uncertain they are"
-        return Judgement(Verdict.FAILED, reason, ["measure more, or state the noise of the channels"])
+        return Judgement([kinds.TOO_FEW.found(reason, rows=tests.rows, parameters=len(parameters))])
     if unfinished := _unfinished(model, outcome.point, seen):
-        advice = ["end the search by least squares, as --method hybrid, auto and least-squares do"]
-        return Judgement(Verdict.UNFINISHED, unfinished, advice)
+        return Judgement([unfinished])
     if tests.wrong_model and seen.end is not None and _fits_until(model, outcome.point, seen):
         cause, remedy = _rough(model, seen)
         reason = f"{cause}: the model fits the first {seen.end:.3g} s; beyond, where "
         reason += f"the misfit is that makes {tests.sized(tests.size)} of all, nothing tells whether this is a minimum"
-        return Judgement(Verdict.UNFINISHED, reason, [remedy])
-    looked, seen_well = Findings(), tests.size > _NEGLIGIBLE * tests.signal
+        return Judgement([kinds.BEGINNING_ONLY.found(reason, remedy, end=seen.end, residual=tests.size)])
+    looked, seen_well = FaultSearch(), tests.size > _NEGLIGIBLE * tests.signal
     misfitting = (tests.limited or tests.wrong_model) and seen_well
     if seen_well:
         at_answer = outcome.point, seen.residual, seen.jacobian, tests.explained
         looked = suspects(model, *at_answer, test=test, misfit=misfitting)
     judged = _by_findings(model, outcome, seen, at, tests, parameters, unknown, looked, misfitting)
-    return replace(judged, hypotheses=looked.hypotheses)
+    return replace(judged, suspects=looked.suspects, hypotheses=looked.hypotheses)
 
 
 def _by_findings(
@@ -119,46 +107,49 @@ def _by_findings(
     tests: ResidualTests,
     parameters: dict[str, Value],
     unknown: list[str],
-    looked: Findings,
+    looked: FaultSearch,
     misfitting: bool,
 ) -> Judgement:
-    """The verdict on a minimum, by what was found of the things taken as known."""
-    if looked.better is not None:
-        reason = f"a better minimum was met, of fitness {looked.better.fitness:.3g} instead of {outcome.fitness:.3g}"
-        advice = ["look for another minimum (--method multi-start)"]
-        return Judgement(Verdict.FAILED, reason, advice, looked.suspects, better=looked.better)
+    """Judge a minimum by what was found of the things taken as known."""
+    if (better := looked.better) is not None:
+        reason = f"a better minimum was met, of fitness {better.fitness:.3g} instead of {outcome.fitness:.3g}"
+        met = kinds.BETTER_MINIMUM.found(reason, fitness=outcome.fitness, better=better.fitness)
+        return Judgement([met], better=better)
     found = looked.suspects
     # A suspect that leaves more than noise explains less than a stretch or a recording that is left out.
-    odd = ("", "")
+    odd: Finding | None = None
     if misfitting and not looked.cut and (not found or found[0].after > _LOUD * tests.explained):
         odd = unless_late(lambda: odd_stretch(model, outcome.point), odd)
     moved = _moved(parameters, looked, tests.rows)
     decisive = bool(found) and found[0].before >= _DECISIVE * found[0].after
     if tests.wrong_model or decisive or (misfitting and moved):
-        return _rejected(model, outcome, seen, tests, found, odd)
+        return Judgement(_rejected(model, outcome, seen, tests, found, odd))
     if moved:
-        return _refuted(tests, looked, moved)
+        return Judgement([_contradicted(tests, looked, moved)])
     if looked.cut and misfitting:
         reason = f"no time was left to see what a misfit of {tests.sized(tests.size)} is due to"
-        return Judgement(Verdict.FAILED, reason, ["allow more time"], found)
+        return Judgement([kinds.NO_TIME.found(reason, residual=tests.size)])
     if not outcome.converged:
-        advice = ["start from a better place, or look for another minimum (--method multi-start)"]
-        return Judgement(Verdict.FAILED, outcome.message or "the search did not converge", advice, found)
+        return Judgement([kinds.NO_CONVERGENCE.found(outcome.message or "the search did not converge")])
     rivals = [rival for rival in rivals_of(model, outcome, at) if not within(model, rival, parameters)]
     if rivals:
-        kinds = {relation(model, outcome.point, rival) for rival in rivals}
-        message = f"{1 + len(rivals)} parameter sets fit equally well ({', '.join(sorted(kinds))})"
-        more = ["sample more often"] * (ALIAS in kinds) + ["measure another marker or a longer motion"] * (
-            kinds != {ALIAS}
-        )
-        advice = [f"{', or '.join(more)}, or narrow the bounds to the set that is meant"]
-        return Judgement(Verdict.AMBIGUOUS, message, advice, found)
+        return Judgement([_ambiguous({relation(model, outcome.point, rival) for rival in rivals}, 1 + len(rivals))])
     refits = [*looked.refits.values()]
-    judged = _identifiable(model, seen, tests, with_refits(model, parameters, refits), unknown, found, odd)
-    return replace(judged, refits=refits)
+    values = with_refits(model, parameters, refits)
+    limits = _limits(values, unknown)
+    return Judgement([*limits, *_cautions(model, seen, tests, found, odd)], refits=refits)
 
 
-def _moved(parameters: Mapping[str, Value], looked: Findings, rows: int) -> list[str]:
+def _ambiguous(relations: set[str], count: int) -> Finding:
+    """Return the finding that several parameter sets fit equally well, by their relations to the answer."""
+    more = ["sample more often"] * (ALIAS in relations)
+    more += ["measure another marker or a longer motion"] * (relations != {ALIAS})
+    advice = f"{', or '.join(more)}, or narrow the bounds to the set that is meant"
+    text = f"{count} parameter sets fit equally well ({', '.join(sorted(relations))})"
+    return kinds.SEVERAL_MINIMA.found(text, advice, minima=count)
+
+
+def _moved(parameters: Mapping[str, Value], looked: FaultSearch, rows: int) -> list[str]:
     """Return what the best significant suspects, so many rows being measured, take out of its interval.
 
     Another reading of the data has no interval in common with the stated one: it moves all parameters.
@@ -172,26 +163,30 @@ def _moved(parameters: Mapping[str, Value], looked: Findings, rows: int) -> list
     ]
 
 
-def _refuted(tests: ResidualTests, looked: Findings, moved: list[str]) -> Judgement:
+def _contradicted(tests: ResidualTests, looked: FaultSearch, moved: list[str]) -> Finding:
     """The rejection of a model that fits no worse than noise, but significantly worse than with something freed."""
     cause, advice = _named(looked.suspects, tests.rows)
     best = looked.hypotheses[0]
     reason = f"the data contradict what is taken as known: {cause}"
     reason += f" (score tests of {len(looked.hypotheses)} hypotheses: p = {best.corrected:.1g}) and move"
-    return Judgement(Verdict.REJECTED, f"{reason} {', '.join(moved)}", advice, looked.suspects)
+    numbers = {"p_value": best.corrected, "hypotheses": len(looked.hypotheses)}
+    return kinds.CONTRADICTED.found(f"{reason} {', '.join(moved)}", *advice, **numbers)
 
 
-def _unfinished(model: ForwardModel, point: Array, seen: Sensitivity) -> str:
-    """Why a point is no end of a search; empty if it may be one."""
+def _unfinished(model: ForwardModel, point: Array, seen: Sensitivity) -> Finding | None:
+    """Return why a point is no end of a search; None if it may be one."""
     outside = (point < model.lower) | (point > model.upper)
     if np.any(outside):
         names = ", ".join(name for name, out in zip(model.names, outside, strict=True) if out)
-        return f"{names} ended outside the bounds of the search"
+        return kinds.OUT_OF_BOUNDS.found(f"{names} ended outside the bounds of the search")
     try:
         better = downhill(model, point, seen)
     except TimeIsUp:
-        return "no time was left to see whether the answer is a minimum"
-    return "" if better is None else sentence(model, point, better)
+        return kinds.NOT_STATIONARY.found("no time was left to see whether the answer is a minimum")
+    if better is None:
+        return None
+    numbers = {"fitness": better.before, "better": better.fitness, "distance": better.distance}
+    return kinds.NOT_STATIONARY.found(sentence(model, point, better), **numbers)
 
 
 def _fits_until(model: ForwardModel, point: Array, seen: Sensitivity) -> bool:
@@ -211,28 +206,30 @@ def _rejected(
     seen: Sensitivity,
     tests: ResidualTests,
     found: list[Suspect],
-    odd: tuple[str, str],
-) -> Judgement:
-    """odd: what is said, and to do, about a stretch that contradicts the rest."""
-    reason = f"the best fit is off by {tests.sized(tests.size)}, {_against(tests)}"
-    advice = list[str]()
-    if found:
-        cause, advice = _named(found, tests.rows)
-        reason += f"; {cause}"
+    odd: Finding | None,
+) -> list[Finding]:
+    """Return the misfit and its likely causes, the likeliest first. odd: a stretch that contradicts the rest."""
+    numbers = {"residual": tests.size, "noise": tests.noise, "signal": tests.signal}
+    text = f"the best fit is off by {tests.sized(tests.size)}, {_against(tests)}"
+    causes = [_cause(found, tests.rows)] if found else []
+    odd = odd or unless_late(lambda: odd_one(model, outcome.point, seen.residual), None)
+    if odd is not None:
+        causes.insert(0 if found and found[0].after > _LOUD * tests.explained else len(causes), odd)
     for name, off in _against_priors(model, seen.residual):
-        reason += f"; {name} is {off:.2g} standard deviations off its prior"
-        advice.insert(0, f"check the prior of {name}")
-    said, do = odd if odd[0] else unless_late(lambda: odd_one(model, outcome.point, seen.residual), odd)
-    if said:
-        reason += f"; {said}"
-        advice.insert(0 if found and found[0].after > _LOUD * tests.explained else len(advice), do)
+        said = f"{name} is {off:.2g} standard deviations off its prior"
+        causes.insert(0, kinds.PRIOR.found(said, f"check the prior of {name}", standard_deviations=off))
     if (exchange := unless_late(lambda: exchanged(model), None)) is not None:
-        reason += f"; {exchange}"
-        advice.append("check which column is which marker")
-    advice.append("look for another minimum (--method multi-start)")
-    if not found and not said:
-        advice.append("check lengths, masses and friction of the model, and which bodies bend")
-    return Judgement(Verdict.REJECTED, reason, advice, found)
+        causes.append(exchange)
+    more = () if causes else ("check lengths, masses and friction of the model, and which bodies bend",)
+    return [kinds.MISFIT.found(text, *more, **numbers), *causes]
+
+
+def _cause(found: list[Suspect], rows: int) -> Finding:
+    """Return the likely cause of a misfit: the best suspect with its equals."""
+    text, advice = _named(found, rows)
+    best = found[0]
+    numbers = {"stated": best.stated, "fitted": best.value, "before": best.before, "after": best.after}
+    return kinds.CAUSE.found(text, *advice, **numbers)
 
 
 def _named(found: list[Suspect], rows: int) -> tuple[str, list[str]]:
@@ -272,43 +269,42 @@ def _rough(model: ForwardModel, seen: Sensitivity) -> tuple[str, str]:
     return cause, "shorten solver.step, or tighten the solver's tolerances"
 
 
-def _identifiable(
-    model: ForwardModel,
-    seen: Sensitivity,
-    tests: ResidualTests,
-    parameters: Mapping[str, Value],
-    unknown: list[str],
-    found: list[Suspect],
-    odd: tuple[str, str],
-) -> Judgement:
-    """Identified, wholly or up to a combination, with what has to be said beside."""
-    reasons, notes, advice = list[str](), list[str](), list[str]()
+def _limits(parameters: Mapping[str, Value], unknown: list[str]) -> list[Finding]:
+    """Return why only a part of the parameters is identified. unknown: combinations that the data leave open."""
+    found = list[Finding]()
     if at_bound := [name for name, value in parameters.items() if value.at_bound]:
-        reasons.append(f"{', '.join(at_bound)} ended at a bound and is not identified")
-        advice.append("widen the bound, or give the parameter its value there")
+        found.append(kinds.AT_BOUND.found(f"{', '.join(at_bound)} ended at a bound and is not identified"))
     if unknown:
-        reasons.append("only combinations are known: some changes of the parameters leave the motion unchanged")
-        advice.append("fix one parameter of each combination, or rely on the quantities that are identifiable")
+        text = "only combinations are known: some changes of the parameters leave the motion unchanged"
+        found.append(kinds.CONFOUNDED.found(text))
     elif vague := [name for name, v in parameters.items() if not v.identifiable and not v.at_bound]:
-        reasons.append(f"{', '.join(vague)}: known no better than by the bounds")
-        advice.append("measure longer or with less noise, or add what is known as a prior")
+        found.append(kinds.VAGUE.found(f"{', '.join(vague)}: known no better than by the bounds"))
+    return found
+
+
+def _cautions(
+    model: ForwardModel, seen: Sensitivity, tests: ResidualTests, found: list[Suspect], odd: Finding | None
+) -> list[Finding]:
+    """Return what limits the intervals of an answer that is not rejected."""
+    noted = list[Finding]()
     if not seen.reliable:
         known = f"rest on the first {seen.end:.3g} s" if seen.end is not None else "are in doubt"
         cause, remedy = _rough(model, seen)
-        notes.append(f"{cause}: the intervals {known}")
-        advice.append(remedy)
-    if tests.limited and tests.size > _NEGLIGIBLE * tests.signal > 0.0:
+        noted.append(kinds.ROUGH.found(f"{cause}: the intervals {known}", remedy))
+    systematic = tests.limited and tests.size > _NEGLIGIBLE * tests.signal > 0.0
+    if systematic:
         share = 100 * tests.excess / tests.signal
         size = f"{tests.sized(tests.excess)} ({share:.2g} % of the signal)"
-        notes.append(f"a systematic residual of {size} widens the intervals: the model, not the noise, limits them")
-        notes += [f"{found[0]}; the intervals hold the answer with it too"] if found else []
-        notes += [said for said in odd[:1] if said]
-        advice += [do for do in odd[1:] if do]
-    elif found:
-        notes.append(f"{found[0]}; the intervals hold the answer with it too")
-    elif tests.too_large:
-        notes.append(f"the noise is {tests.ratio:.3g} times what was stated; the intervals go by what was found")
+        text = f"a systematic residual of {size} widens the intervals: the model, not the noise, limits them"
+        noted.append(kinds.SYSTEMATIC.found(text, excess=tests.excess, signal=tests.signal))
+    if found:
+        noted.append(kinds.CAUSE.found(f"{found[0]}; the intervals hold the answer with it too"))
+    if systematic and odd is not None:
+        noted.append(odd)
+    if not systematic and not found and tests.too_large:
+        text = f"the noise is {tests.ratio:.3g} times what was stated; the intervals go by what was found"
+        noted.append(kinds.NOISE_UNDERSTATED.found(text, ratio=tests.ratio))
     if tests.unresolved:
-        notes.append("the samples do not resolve the motion: what the model leaves out of it between them is not seen")
-    verdict = Verdict.COMBINATION if reasons else Verdict.IDENTIFIED
-    return Judgement(verdict, "; ".join([*reasons, *notes]), advice, found)
+        text = "the samples do not resolve the motion: what the model leaves out of it between them is not seen"
+        noted.append(kinds.UNRESOLVED.found(text))
+    return noted

@@ -1,0 +1,82 @@
+"""Findings: what an analysis found out about its answer, each with a code, a severity, a sentence and its numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any
+
+from shoal.trajectory import plain
+
+
+class Severity(StrEnum):
+    """What a finding does to an answer."""
+
+    NOTE = "note"
+    """The answer holds; this explains it."""
+    CAUTION = "caution"
+    """The answer holds, but a part of it is limited or unknown."""
+    REJECTION = "rejection"
+    """There is no answer that can be used."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of finding: its code, what it means, and what to do in general.
+
+    code: lower case with hyphens, the same in every version, for programs to look for
+    severity: of all findings of this kind; implies: the status or verdict that such a finding leads to, else empty
+    """
+
+    code: str
+    severity: Severity
+    meaning: str
+    remedy: str = ""
+    implies: str = ""
+
+    def found(self, text: str, *steps: str, **numbers: float) -> Finding:
+        """Return a finding of this kind. steps: what to do about this one; numbers: in SI units, by name."""
+        return Finding(self, text, steps, numbers)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What was found out about an answer.
+
+    text: one sentence or clause without a full stop; steps: what to do about this finding, before the general remedy
+    numbers: the quantities that the text mentions, in SI units
+    """
+
+    kind: Kind
+    text: str
+    steps: tuple[str, ...] = ()
+    numbers: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def code(self) -> str:
+        """The code of its kind."""
+        return self.kind.code
+
+    @property
+    def severity(self) -> Severity:
+        """The severity of its kind."""
+        return self.kind.severity
+
+    def to_json(self) -> dict[str, Any]:
+        """Return code, severity, text, numbers and what to do."""
+        steps = [*self.steps, *([self.kind.remedy] if self.kind.remedy else [])]
+        numbers = plain(dict(self.numbers))
+        return {"code": self.code, "severity": str(self.severity), "text": self.text, "numbers": numbers, "do": steps}
+
+
+def message(findings: Iterable[Finding]) -> str:
+    """Return the texts of findings as one line."""
+    return "; ".join(one.text for one in findings)
+
+
+def steps(findings: Iterable[Finding]) -> list[str]:
+    """Return what to do about findings, each step once: those of single findings, then the remedies of their kinds."""
+    all_ = list(findings)
+    found = [step for one in all_ for step in one.steps] + [one.kind.remedy for one in all_ if one.kind.remedy]
+    return list(dict.fromkeys(found))
