@@ -20,6 +20,7 @@ import shoal
 from click.testing import CliRunner
 from shoal import swarm
 from shoal.cli import main
+from shoal.engines import ENGINES, get_engine
 from shoal.identification import METHODS, methods
 from shoal_flows.deployment import processes, up
 
@@ -74,6 +75,18 @@ def test_readme_fits_on_a_page_and_its_commands_run_as_printed() -> None:
     )
     # No word to be replaced, and no file that has not been written before.
     assert not any(word.isupper() for words in commands for word in words[1:])
+
+
+def test_kinds_without_a_second_engine_are_those_that_the_page_names() -> None:
+    (named,) = re.findall(r"The kinds (.*) have no second engine", (DOCS / "validation.md").read_text(encoding="utf-8"))
+    ours, *others = (set().union(*kinds(name)) for name in ("gauss", *(set(ENGINES) - {"gauss"})))
+    assert set(re.findall(r"`([a-z-]+)`", named)) == ours.difference(*others)
+
+
+def kinds(engine: str) -> tuple[frozenset[str], ...]:
+    """The elements, joints and loads of an engine."""
+    can = get_engine(engine).capabilities
+    return can.elements, can.joints, can.loads
 
 
 def test_notebook_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
