@@ -46,22 +46,8 @@ class _Storage(caching.CompileResultCacheImpl):  # type: ignore[misc]
     _locator_classes = (_Locator,)
 
 
-class _Index(caching.IndexDataCacheFile):  # type: ignore[misc]
-    def _load_index(self) -> dict[Any, str]:
-        """Return what is kept of a kernel; nothing where a version has kept types that this one has elsewhere."""
-        try:
-            found: dict[Any, str] = super()._load_index()
-        except (ImportError, AttributeError):
-            return {}
-        return found
-
-
 class _Cache(caching.FunctionCache):  # type: ignore[misc]
     _impl_class = _Storage
-
-    def __init__(self, function: FunctionType) -> None:
-        super().__init__(function)
-        self._cache_file.__class__ = _Index
 
     def _index_key(self, signature: Any, generator: Any) -> tuple[Any, ...]:
         """Return a key of texts: one of types is unreadable to versions that have their classes elsewhere."""

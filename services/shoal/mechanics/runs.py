@@ -223,7 +223,7 @@ class Runs:
     def _started(self, begun: Array) -> dict[str, Any]:
         """The start as it is used, what of it was stated otherwise, and joints whose forces are not unique."""
         scene, model = self.scene, self.model
-        used = start.begun(model.frames, model.scene, *np.split(begun, 2))
+        used = start.body_states(model.frames, model.scene, *np.split(begun, 2))
         redundant = () if start.is_direct(scene) else redundant_joints(scene, used)
         told = start.facts(scene, used, float(reaches.size(scene))) | {"redundant_joints": list(redundant)}
         return dict(plain(told))
@@ -259,7 +259,7 @@ class Changes(Sequence[Mapping[str, Any]]):
         if not stated.starts_at_rest and start.is_direct(stated):
             return [{} for _ in range(lanes)]
         q, v = (np.broadcast_to(x, (len(x), lanes)) for x in (model.q0, model.v0))
-        found = start.changes(stated, start.begun(model.frames, model.scene, q, v), reaches.size(stated), lanes)
+        found = start.changes(stated, start.body_states(model.frames, model.scene, q, v), reaches.size(stated), lanes)
         failed = np.broadcast_to(model.failed, lanes)
         return [{} if none else one for one, none in zip(found, failed, strict=True)]
 

@@ -12,7 +12,7 @@ from shoal.mechanics.assembly.redundancy import redundant_joints
 from shoal.mechanics.halts import halts
 from shoal.mechanics.integrators import Choice
 from shoal.mechanics.numerics.tile import SINGLE
-from shoal.mechanics.start.start import begun
+from shoal.mechanics.start.start import body_states
 from shoal.mechanics.workspace import Workspace
 from shoal.scene import Scene
 
@@ -46,7 +46,7 @@ def test_the_work_of_a_step_grows_with_the_number_of_bodies(kind: str) -> None:
 def redundant(scene: Scene) -> tuple[str, ...]:
     """The joints that hold a machine twice as it starts."""
     model = build(scene)
-    return redundant_joints(scene, begun(model.frames, scene, model.q0[:, 0], model.v0[:, 0]))
+    return redundant_joints(scene, body_states(model.frames, scene, model.q0[:, 0], model.v0[:, 0]))
 
 
 def test_a_long_chain_has_no_redundant_joint_until_one_holds_it_twice() -> None:

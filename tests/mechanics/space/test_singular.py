@@ -10,7 +10,7 @@ from shoal.mechanics.analysis.reactions import reactions
 from shoal.mechanics.assembly import redundancy
 from shoal.mechanics.assembly.build import build
 from shoal.mechanics.simulate import simulate
-from shoal.mechanics.start.start import begun
+from shoal.mechanics.start.start import body_states
 from shoal.scene import Scene, load_scene
 from shoal_validation.stability.singular_in_space import MACHINES, TURN, linkage
 
@@ -82,7 +82,7 @@ def test_inverse_iterations_find_the_same_redundant_joints(name: str, monkeypatc
     """As they do for machines with many constraints."""
     scene = Scene.parse(MACHINES[name][0](0.6))
     model = build(scene)
-    start = begun(model.frames, scene, model.q0[:, 0], model.v0[:, 0])
+    start = body_states(model.frames, scene, model.q0[:, 0], model.v0[:, 0])
     few = redundancy.redundant_joints(scene, start)
     monkeypatch.setattr(redundancy, "DENSE", 0)
     monkeypatch.setattr(redundancy, "SOUGHT", 3)

@@ -227,3 +227,23 @@ def test_lanes_start_where_a_scene_by_itself_does_however_its_start_is_rounded()
                 continue
             assert lanes.status[lane] is alone.status[0], (seed, lanes.reasons)
             np.testing.assert_allclose(lanes.points[..., lane], alone.points[..., 0], atol=1e-9)
+
+
+@pytest.mark.parametrize("spin", [0.0, 2.0])
+def test_a_planar_loop_whose_pivots_are_not_in_one_plane_is_refused(spin: float) -> None:
+    """No motion changes the offset along the axes, so that no constraint on shared coordinates has it."""
+    rod = {"kind": "rod", "height": 0.02, "width": 0.02, "density": 2700.0}
+    ends = [("ground", [0, 0, 0], "a", "start"), ("a", "end", "b", "start"), ("b", "end", "c", "end")]
+    ends.append(("ground", [1, 0, 0.1], "c", "start"))
+    scene = {
+        "name": "out of plane", "dimensions": 3,
+        "bodies": {"a": {**rod, "length": 0.5}, "b": {**rod, "length": 1.0}, "c": {**rod, "length": 0.5}},
+        "joints": {f"J{k}": {"first": {"body": a, "point": p}, "second": {"body": b, "point": q}}
+                   for k, (a, p, b, q) in enumerate(ends)},
+        "markers": {"b": {"body": "b"}},
+        "initial": {"a": {"angle": 0.7, "rate": spin}, "b": {"angle": 0.0}, "c": {"angle": 0.7}},
+    }  # fmt: skip
+    with pytest.raises(InputError, match=r"joints\.J\d: cannot be assembled; its places stay 0\.1 m apart at best"):
+        start.place_started(Scene.parse(scene))
+    scene["joints"]["J3"]["first"]["point"] = [1, 0, 0]  # type: ignore[index]
+    assert not np.any(start.place_started(Scene.parse(scene)).failed)

@@ -24,7 +24,7 @@ from shoal.mechanics.assembly.masses import second_moments
 from shoal.mechanics.assembly.space.start import place_started
 from shoal.mechanics.numerics.tile import stacked
 from shoal.mechanics.reach import span
-from shoal.mechanics.start.start import begun
+from shoal.mechanics.start.start import body_states
 from shoal.scene import GROUND, Attachment, Force, InitialState, PointMass, Revolute, Scene, Slider, Spherical, Torque
 from shoal.scene.dimensions import padded
 from shoal.trajectory import Array
@@ -156,7 +156,7 @@ def started(scene: Scene) -> tuple[dict[str, BodyStart], Any, dict[str, InitialS
         return found, lambda side, axis: np.array([0.0, 0.0, 1.0]), initial
     placement = place_started(scene)
     q, v = stacked(placement.positions)[:, 0], stacked(placement.velocities)[:, 0]
-    initial = begun(placement.frames, scene, q, v)
+    initial = body_states(placement.frames, scene, q, v)
     for name, begin in initial.items():
         axes = Rotation.from_rotvec(begin.rotation or (0.0, 0.0, 0.0)).as_matrix()
         parts = (np.array(part, dtype=float) for part in (begin.position, begin.velocity, begin.spin or (0, 0, 0)))

@@ -109,7 +109,7 @@ def _pose(scene: Scene, name: str, mine: list[JointPoint], turning: Orientations
         position, velocity, p = rail
     body = scene.bodies[name]
     if isinstance(body, Rod) and body.element != "rigid" and body.curvature:
-        p = rod_axis(body, p[0])  # on a flexible rod the arc length tells a place
+        p = rod_axis(body, p[0])  # on a flexible rod a place is an arc length
     if body.element == "modal" and (known or start.position is None):
         place, rate, _, _ = bent(scene, name, p)
         p, pdot = ((np.real(part), np.imag(part)) for part in (place, rate))

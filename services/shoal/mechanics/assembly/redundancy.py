@@ -30,7 +30,7 @@ BESIDE = 1e-5
 ASIDE = 0.02
 """How far [1, rad] the machine is moved to leave a singular position."""
 CLOSED = 1e-9
-"""Joints that gape by less, relative to the size of the machine or in rad, are closed."""
+"""Joints with a smaller residual, relative to the size of the machine or in rad, are closed."""
 DENSE = 150
 """Up to so many rows all singular values are found."""
 LARGEST = 400

@@ -24,7 +24,7 @@ from shoal.scene import PointMass, Scene
 from shoal.scene.initial import POSES, Quantity
 
 CLOSED = 1e-11
-"""A joint that gapes by less, relative to the size of the machine or in rad, is closed."""
+"""A joint with a smaller residual, relative to the size of the machine or in rad, is closed."""
 ROUNDING = 1e-4
 """Stated values may miss by so much, relative to the size of the machine or in rad, and are then corrected."""
 ITERATIONS = 80
@@ -125,7 +125,7 @@ class Assembly:
         self._sought: dict[tuple[bytes, bytes], Placed] = {}
         """What was looked for before: where it is not there, the reason is sought by the same steps."""
         self.effort = 0
-        """Gaps that were looked at while closing joints, those of many lanes at once counted once."""
+        """Residuals evaluated while closing joints, those of many lanes at once counted once."""
 
     def _guess(self, attempt: int, keep: Flags) -> Array:
         """Poses of the first guess; later attempts shake the turns that are not in `keep`, (lanes, columns)."""
@@ -295,5 +295,5 @@ class Assembly:
         slope = self.closure.at(u, own=False).rows(u).slope * np.sqrt(np.where(kept, 0.0, self.give))[:, None, :]
         basis = np.linalg.svd(slope, full_matrices=False)
         rank = DEPENDENT * np.max(basis.S, axis=1, initial=1e-300, keepdims=True) < basis.S
-        told = np.einsum("lri,lr->li", basis.Vh**2, rank.astype(float))
-        return np.asarray(1.0 - told[:, one.columns] > DEPENDENT)
+        determined = np.einsum("lri,lr->li", basis.Vh**2, rank.astype(float))
+        return np.asarray(1.0 - determined[:, one.columns] > DEPENDENT)

@@ -70,9 +70,9 @@ class Velocities:
         ok, broken = np.ones(self.lanes, dtype=bool), []
         for k in keep:
             length = 1.0 if self.rows.angular[k] else self.size
-            left, told = basis.add(self.rows.slope[:, k], -self.rows.rate[:, k])
+            left, dependent = basis.add(self.rows.slope[:, k], -self.rows.rate[:, k])
             if not self.flexible:  # an elastic rod gives way
-                ok &= ~told | (left <= 1e2 * AGREES * self.speed * length / self.size)
+                ok &= ~dependent | (left <= 1e2 * AGREES * self.speed * length / self.size)
         closed = basis.size
         kept: list[tuple[Statement, Flags]] = []
         for one in given:
@@ -80,9 +80,9 @@ class Velocities:
             for column, value in zip(one.columns, one.values.T, strict=True):
                 row = np.zeros_like(self.guess)
                 row[:, column] = 1.0
-                left, told = basis.add(row, value)
-                good &= ~told | (left <= AGREES * self.speed / self._unit(one))
-                missed = told & (left > ROUNDING * self.speed / self._unit(one))
+                left, dependent = basis.add(row, value)
+                good &= ~dependent | (left <= AGREES * self.speed / self._unit(one))
+                missed = dependent & (left > ROUNDING * self.speed / self._unit(one))
                 if one.firm:
                     ok &= ~missed
                     broken += [one] * bool(missed[0] and one not in broken)
@@ -195,12 +195,12 @@ class _Basis:
         for _ in range(2):
             rest = rest - np.einsum("lri,lr->li", self.rows, np.einsum("lri,li->lr", self.rows, rest))
         size = np.linalg.norm(rest, axis=1)
-        told = size <= SINGULAR
-        unit_row = np.where(told[:, None], 0.0, rest / np.where(told, 1.0, size)[:, None])
-        self.y = self.y + unit_row * np.where(told, 0.0, left / length / np.where(told, 1.0, size))[:, None]
+        dependent = size <= SINGULAR
+        unit_row = np.where(dependent[:, None], 0.0, rest / np.where(dependent, 1.0, size)[:, None])
+        self.y = self.y + unit_row * np.where(dependent, 0.0, left / length / np.where(dependent, 1.0, size))[:, None]
         self.rows = np.concatenate([self.rows, unit_row[:, None]], axis=1)
-        self.dependent |= told
-        return np.abs(left), told
+        self.dependent |= dependent
+        return np.abs(left), dependent
 
     def rates(self) -> Array:
         """v with L' v = y."""

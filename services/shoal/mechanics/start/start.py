@@ -125,10 +125,10 @@ def is_direct(scene: Scene) -> bool:
 def pose_refused(assembly: Assembly) -> InputError:
     """Return an error that names the stated poses in contradiction, or the joint that cannot be closed at all."""
     if not assembly.seek([]).ok[0]:
-        name, gap, _ = _gape(assembly, [])
+        name, gap, _ = _worst_residual(assembly, [])
         return InputError(f"joints.{name}: cannot be assembled; its places stay {gap} apart at best")
     guilty, fewest = _narrowed(assembly, [one for one in assembly.statements if one.firm])
-    name, gap, small = _gape(assembly, guilty)
+    name, gap, small = _worst_residual(assembly, guilty)
     why = f"joint {name} would stay {gap} apart"
     if small:
         # Of a machine that holds itself more than it needs to: no statement is at fault.
@@ -141,7 +141,7 @@ def _narrowed(assembly: Assembly, guilty: list[Statement]) -> tuple[list[Stateme
 
     Large parts are left out first; the last statements of the scene are kept, as the ones in excess.
     """
-    begun, joints = assembly.effort, list(assembly.scene.joints)
+    before, joints = assembly.effort, list(assembly.scene.joints)
     for mechanism in dict.fromkeys(tuple(_connected(assembly.scene, [one.body])) for one in guilty):
         own = [one for one in guilty if tuple(_connected(assembly.scene, [one.body])) == mechanism]
         if own != guilty and not assembly.closes(own, mechanism):
@@ -154,7 +154,7 @@ def _narrowed(assembly: Assembly, guilty: list[Statement]) -> tuple[list[Stateme
     while size:
         first = 0
         while first < len(guilty):
-            if assembly.effort - begun > _EFFORT:
+            if assembly.effort - before > _EFFORT:
                 return guilty, False
             fewer = guilty[:first] + guilty[first + size :]
             if fewer and not assembly.closes(fewer, joints):
@@ -182,7 +182,7 @@ def _pulled(assembly: Assembly, chosen: list[Statement]) -> list[Statement]:
     return [one for one, size in zip(chosen, largest, strict=True) if size > _SLACK * max(largest)]
 
 
-def _gape(assembly: Assembly, chosen: list[Statement]) -> tuple[str, str, bool]:
+def _worst_residual(assembly: Assembly, chosen: list[Statement]) -> tuple[str, str, bool]:
     """Return the joint of the worst residual with these statements kept, its size, and whether rounding explains it."""
     rows = _held_open(assembly, chosen)[1]
     near = _connected(assembly.scene, [one.body for one in chosen])
@@ -220,9 +220,9 @@ def _rates_refused(velocities: Velocities, broken: list[Statement]) -> InputErro
     guilty = [one for one in others if last not in velocities.run(without=one).broken]
     names = dict.fromkeys((*velocities.walk.closing, *velocities.rows.names))
     joint = next((name for name in names if last not in velocities.run(joint=name).broken), "")
-    told = velocities.run(without=last).rates[0, last.columns]
-    told = np.where(np.abs(told) > UNCHANGED * velocities.speed, told, 0.0)
-    wants = f"joint {joint} asks for {_written(told)} {UNITS[last.quantity]}" if joint else "they cannot both hold"
+    asked = velocities.run(without=last).rates[0, last.columns]
+    asked = np.where(np.abs(asked) > UNCHANGED * velocities.speed, asked, 0.0)
+    wants = f"joint {joint} asks for {_written(asked)} {UNITS[last.quantity]}" if joint else "they cannot both hold"
     return _contradiction([*guilty, last], wants)
 
 
@@ -247,7 +247,7 @@ def _written(values: Array) -> str:
     return numbers[0] if len(numbers) == 1 else f"[{', '.join(numbers)}]"
 
 
-def begun(frames: Mapping[str, Frame], scene: Scene, q: Array, v: Array) -> dict[str, InitialState]:
+def body_states(frames: Mapping[str, Frame], scene: Scene, q: Array, v: Array) -> dict[str, InitialState]:
     """Return the state of every body at the coordinates q and rates v of a machine, each (unknowns,).
 
     scene: in the plane with a complete start, to whose angles whole turns are counted. In space rods have no attitude.
@@ -268,7 +268,7 @@ def begun(frames: Mapping[str, Frame], scene: Scene, q: Array, v: Array) -> dict
 
 
 def _angle(frame: Frame, near: Number, q: Array, v: Array) -> dict[str, Any]:
-    """The angle of a body in the plane, its rate, and its modes; near: an angle that tells the whole turns [rad]."""
+    """The angle of a body in the plane, its rate, and its modes; near: one with the same whole turns [rad]."""
     modes, mode_rates = tuple[float, ...](), tuple[float, ...]()
     if isinstance(frame, ModalFrame):
         axis = frame.directors[0]
@@ -334,17 +334,17 @@ def changes(scene: Scene, used: Mapping[str, InitialState], size: Number, lanes:
         for quantity in UNITS:
             if getattr(start, quantity) is None:
                 continue
-            told, stated, now = _alike(quantity, getattr(start, quantity), used[name], lanes)
+            compared, stated, now = _alike(quantity, getattr(start, quantity), used[name], lanes)
             if now is None:
                 continue
             off = np.max(np.abs(now[: len(stated)] - stated[: len(now)]), axis=0)
             small = UNCHANGED * np.maximum(np.max(np.abs(stated), axis=0), least.get(quantity, 1.0))
-            about_z = np.broadcast_to(told == quantity or np.all(np.abs(now[:2]) <= small, axis=0), lanes)
+            about_z = np.broadcast_to(compared == quantity or np.all(np.abs(now[:2]) <= small, axis=0), lanes)
             for lane in np.flatnonzero(off > small):
-                name_told = quantity if about_z[lane] else told
+                reported = quantity if about_z[lane] else compared
                 parts = stated[:, lane].tolist(), now[:, lane].tolist()
-                one, other = (part[-1] if name_told in ABOUT_Z else tuple(part) for part in parts)
-                found[lane].setdefault(name, {})[name_told] = {"stated": one, "used": other, "unit": UNITS[name_told]}
+                one, other = (part[-1] if reported in ABOUT_Z else tuple(part) for part in parts)
+                found[lane].setdefault(name, {})[reported] = {"stated": one, "used": other, "unit": UNITS[reported]}
     return found
 
 

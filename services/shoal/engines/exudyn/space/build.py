@@ -22,7 +22,7 @@ from shoal.mechanics.assembly.space.start import place_started
 from shoal.mechanics.frames import BeamFrame, PointFrame
 from shoal.mechanics.numerics.tile import stacked
 from shoal.mechanics.reach import span
-from shoal.mechanics.start.start import begun
+from shoal.mechanics.start.start import body_states
 from shoal.scene import GROUND, ModalBody, PointMass, Rod, Scene
 from shoal.scene.dimensions import padded
 
@@ -75,7 +75,7 @@ def build_in_space(
     exchanges += [add_load(ends, name, load) for name, load in scene.loads.items()]
     mbs.Assemble()
     reference = mbs.systemData.GetODE2Coordinates(configuration=exu.ConfigurationType.Reference)
-    started = scene.model_copy(update={"initial": begun(placement.frames, scene, q, v)})
+    started = scene.model_copy(update={"initial": body_states(placement.frames, scene, q, v)})
     dependent = _dependent(exu, mbs) if any(loops(scene)) else 0
     return ExudynSystem(
         started, system, mbs, container, clock, parts, gaps, exchanges, span(scene), np.array(reference), dependent

@@ -44,10 +44,10 @@ class Attitudes:
         if root == GROUND:
             return relative
         members = (body, *self._members.get(root, ()))
-        says = [member for member in members if self.stated(member) is not None]
-        firm = [member for member in says if not {"angle", "rotation"} & {*self._scene.initial[member].guess}]
-        teller = next(iter([*firm, *says, root]))
-        return product(self._begin[teller], product(transposed(self.kept.root(teller)[1]), relative))
+        stating = [member for member in members if self.stated(member) is not None]
+        firm = [member for member in stating if not {"angle", "rotation"} & {*self._scene.initial[member].guess}]
+        reference = next(iter([*firm, *stating, root]))
+        return product(self._begin[reference], product(transposed(self.kept.root(reference)[1]), relative))
 
     def spin(self, body: str) -> Array:
         """The angular velocity of a body along the axes of the ground."""

@@ -34,7 +34,7 @@ class SpatialPlacement(AttitudeVectors, Placement):
         self.strained: dict[tuple[str, int | None], Array] = {}
         """How sections of rods that start strained are turned from the unstrained start, by body and node."""
         self.chosen: set[tuple[str, int]] = set()
-        """Bodies, and which joint points tell how they are turned."""
+        """Bodies, and which joint points determine their rotation."""
 
     def of_image(self, side: Attachment, image: Any) -> Affine:
         """Return the vector of a rigid body or the ground with these components in its frame. Raises InputError."""
@@ -69,10 +69,10 @@ class SpatialPlacement(AttitudeVectors, Placement):
         if not isinstance(self.frames[side.body], RigidFrame):
             raise InputError(f"joints.{name}: turns {side.body}, which is not rigid; weld a rigid body to it instead")
         if not self.axis(side, axis).rests:
-            told = ", ".join(f"{np.ravel(part)[-1]:g}" for part in axis)
+            listed = ", ".join(f"{np.ravel(part)[-1]:g}" for part in axis)
             kind = self.scene.joints[name].kind
             raise InputError(
-                f"joints.{name}: {side.body} does not turn about an axis at rest, ({told}) at the start; a {kind} in "
+                f"joints.{name}: {side.body} does not turn about an axis at rest, ({listed}) at the start; a {kind} in "
                 "space turns on hinges whose axes the ground holds"
             )
         return super().angle(name, side, axis)

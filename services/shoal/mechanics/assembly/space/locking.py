@@ -33,7 +33,7 @@ LARGEST = 500
 _WAY = 0.05
 """How far the machine is taken along the motion that is nearly free; a director has unit length."""
 _SAME = 10.0
-"""The joints may gape there by so many times what they do to first order."""
+"""The residual of the joints there may be so many times what it is to first order."""
 _SHARE = 1e-3
 """Part in a dependence, squared, from which a row counts as one of those that make it."""
 
@@ -110,10 +110,10 @@ def lock(gap: Callable[[Array], Array], slope: Callable[[Array], Array], q: Arra
     left, sizes, right = np.linalg.svd(slope(q), full_matrices=False)
     for k in np.flatnonzero((sizes > LEAST) & (sizes < MOST))[::-1]:
         there = _closed(gap, slope, q + _WAY * right[k])
-        gapes = float(np.max(np.abs(gap(there))))
+        residual = float(np.max(np.abs(gap(there))))
         depends = np.any(np.linalg.svd(slope(there), compute_uv=False) < _SAME * sizes[k])
         moved = float(np.linalg.norm(there - q))
-        if gapes < _SAME * sizes[k] * _WAY and depends and moved > _WAY / 2:
+        if residual < _SAME * sizes[k] * _WAY and depends and moved > _WAY / 2:
             return Lock(np.flatnonzero(np.abs(left[:, k]) > np.sqrt(_SHARE)).tolist(), float(sizes[k]))
     return None
 

@@ -15,19 +15,21 @@ from shoal.errors import InputError
 from shoal.mechanics import reach
 from shoal.mechanics import rotation as turns
 from shoal.mechanics.affine import points
+from shoal.mechanics.assembly.groups import is_stiff
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
 from shoal.mechanics.assembly.space.locking import require_unlocked
 from shoal.mechanics.assembly.space.placement import place_in_space
 from shoal.mechanics.assembly.space.rigid_bodies import SpatialBodies
 from shoal.mechanics.frames import BeamFrame, RigidFrame
 from shoal.mechanics.numerics.tile import Array, Flags, stacked
-from shoal.mechanics.start.closure import Poses
+from shoal.mechanics.start.closure import Closure, Poses
 from shoal.mechanics.start.poses import CLOSED, ROUNDING, Assembly, Statement, stated
 from shoal.mechanics.start.start import place_at, pose_refused
 from shoal.mechanics.start.strained import gives_way, require_numbers
 from shoal.mechanics.term_values import TermValues
 from shoal.scene import Scene
 from shoal.scene.initial import POSES, RATES
+from shoal.scene.joints import places
 from shoal.scene.paths import lanes_of
 
 DEPENDENT = 1e-9
@@ -83,7 +85,8 @@ class _Start:
 
     def run(self) -> SpatialPlacement:
         """Return a placement with the result. Raises InputError if a scene without lanes has no start."""
-        begin, off = self._poses(shared=True), np.zeros(self.lanes) + self.gaps
+        begin = self._poses(shared=True)
+        off = np.maximum(np.zeros(self.lanes) + self.gaps, self._open(begin))
         for one in stated(self.scene, self.lanes, POSES):
             wanted = begin.numbers
             wanted[:, one.numbers] = one.put
@@ -108,14 +111,27 @@ class _Start:
     def _poses(self, shared: bool = False) -> Poses:
         """Return the poses of the bodies as they are placed; shared: of rigid ones by closed coordinates."""
         count = len(self.scene.bodies)
-        places, axes = np.zeros((self.lanes, count + 1, 3)), np.zeros((self.lanes, count + 1, 3, 3)) + np.eye(3)
+        origins, axes = np.zeros((self.lanes, count + 1, 3)), np.zeros((self.lanes, count + 1, 3, 3)) + np.eye(3)
         for k, name in enumerate(self.scene.bodies):
             pose, frame = self.placement.poses[name], self.placement.frames[name]
-            places[:, k], axes[:, k] = pose.position.T, pose.directors.transpose(2, 1, 0)
+            origins[:, k], axes[:, k] = pose.position.T, pose.directors.transpose(2, 1, 0)
             if shared and isinstance(frame, RigidFrame):
-                places[:, k] = place_at(frame.origin, self.q).T
+                origins[:, k] = place_at(frame.origin, self.q).T
                 axes[:, k] = np.array([place_at(one, self.q) for one in frame.directors]).transpose(2, 1, 0)
-        return Poses(places, axes, np.zeros(places.shape[:2]))
+        return Poses(origins, axes, np.zeros(origins.shape[:2]))
+
+    def _open(self, begin: Poses) -> Array:
+        """Return the largest residual of joints between rigid bodies by lane or of all, relative to the size.
+
+        Coordinates that bodies share leave out of the constraints what no motion changes, as an offset along the axes
+        of a planar loop.
+        """
+        scene = self.scene
+        rigid = [name for name, j in scene.joints.items() if all(is_stiff(scene, side.body) for side in places(j))]
+        rows = Closure(scene, begin, bodies=SpatialBodies(scene)).rows(begin)
+        gaps = np.abs(rows.gap / np.where(rows.angular, 1.0, self.size)) * np.isin(rows.names, rigid)
+        found = np.asarray(np.max(gaps, axis=1, initial=0.0))
+        return found if len(found) == self.lanes else np.max(found, keepdims=True)
 
     def _assemble(self, chosen: Flags) -> Flags:
         """Place these lanes so that their joints close, and return which have no such poses. Raises InputError."""
