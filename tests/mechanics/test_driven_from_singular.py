@@ -69,22 +69,34 @@ def test_a_drive_that_moves_at_once_starts_on_a_branch(count: int, seed: int) ->
     run = GaussEngine().simulate(scene, TIMES)
     assert run.ok, run.message
     np.testing.assert_allclose(run.angles[:, 1, 0], 0.5 * rate * np.sin(2 * TIMES), atol=1e-12)
-    assert off_branch(run, pins) < 1e-8
+    assert off_branch(run, pins) < 1e-11
     assert run.energy_drift[0] < 1e-6
 
 
-@pytest.mark.parametrize(("count", "seed"), [(2, 0), (2, 1), (3, 0), (3, 1), (4, 0), (4, 1), (4, 2)])
-@pytest.mark.parametrize("drive", ["0.4*(1-cos(2*t))", "1.5*t**2"])
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("count", [2, 3, 4])
+@pytest.mark.parametrize("drive", ["0.4*(1-cos(2*t))", "1.5*t**2", "0.3*t**3", "0.5*t**5", "max(0,t-0.05)**2"])
 def test_a_drive_that_sets_out_from_rest_leaves_on_a_branch(count: int, seed: int, drive: str) -> None:
-    """The fourth derivative of the drive was left out of the condition that the accelerations of branches meet.
-
-    Two cranks of seed 1 creep and fail, which is no wrong motion.
-    """
+    """Its first derivatives by time vanish there: the motion left on no branch, or crept beside it to its last step."""
     scene, pins = draw(seed, count, drive, {})
     run = GaussEngine().simulate(scene, TIMES)
-    if (count, seed) == (2, 1) and not run.ok:
-        assert "steps of dop853" in run.message
-        return
     assert run.ok, run.message
-    assert off_branch(run, pins) < 1e-8
+    assert run.steps < 300
+    assert off_branch(run, pins) < 1e-11
     assert run.energy_drift[0] < 1e-6
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_a_held_crank_holds_the_others(count: int) -> None:
+    """No branch passes with the crank at rest; a coordinate that the crank holds was taken for the direction of one."""
+    scene, pins = draw(0, count, "0", {})
+    run = GaussEngine().simulate(scene, TIMES)
+    assert run.ok, run.message
+    assert off_branch(run, pins) < 1e-12
+
+
+def test_a_run_that_creeps_names_the_singular_position() -> None:
+    scene, _ = draw(0, 2, "0.3*t**3", {})
+    run = GaussEngine().simulate(scene.with_values({"solver.max_steps": 3}), TIMES)
+    assert not run.ok
+    assert "at a singular position" in run.message

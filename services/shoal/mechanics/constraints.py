@@ -1,12 +1,15 @@
-"""Constraints that are at most quadratic in the coordinates: C = sum of factor u w + c + f(t), one kernel for all.
+"""Constraints that are at most quadratic in the coordinates: C = sum of factor u w + c + f(p), one kernel for all.
 
 Gears are the exception, C = sum of share * angle + c but for multiples of a period, as their teeth have no numbers. As
 the vectors d of the angles are of unit length, C_q is linear in d all the same, (-d_y, d_x), and there is no bias.
 
 u and w are rows of the state: unknowns, or components of vectors that are affine in them. As differences of points
 are formed before they are multiplied, the round-off of C does not grow with the distance from the origin. C_q, the
-bias C_qq v v + f''(t) and the third derivative of C follow from the same lists. The Jacobian is sparse: entry e is
+bias C_qq v v + C_tt and the third derivative of C follow from the same lists. The Jacobian is sparse: entry e is
 the column `column[e]` of the constraint whose range in `entry` contains e.
+
+A drive p(t), an angle or a length, enters by f = -p, -cos p, -sin p or -p^2, whose derivatives are exact: C(q, p) does
+not depend on time otherwise, and is the geometry of the machine with the drive as one more coordinate.
 """
 
 from __future__ import annotations
@@ -26,15 +29,18 @@ POWERS = 3
 """Constraints are measured in 1 (directions), m or m^2."""
 OPEN = 1e-6
 """Largest violation of a constraint that may be believed, relative to the machine's size to its power of a length."""
+LINEAR, SQUARE, COSINE, SINE = range(4)
+"""How a drive enters."""
+WAYS = {("neg",): LINEAR, ("square", "neg"): SQUARE, ("cos", "neg"): COSINE, ("sin", "neg"): SINE}
+"""The same by the operations of `scene.function.Composed`."""
 
 
 class Constraints(NamedTuple):
     """Product p of constraint k in start[k]:start[k+1] is factor[p] * z[left[p]] * z[right[p]]; left = -1 stands for 1.
 
     constant: c, (constraints, lanes). lengths: C is in m to that power. open: the size of C from which a joint counts
-    as open, (constraints, lanes). drive: number of the function f of every
-    constraint (-1: none). Part r of the Jacobian adds coefficient[r] * z[source[r]] to the entry target[r]; source = -1
-    stands for 1.
+    as open, (constraints, lanes). drive: number of the function p of every constraint (-1: none); way: how it enters.
+    Part r of the Jacobian adds coefficient[r] * z[source[r]] to the entry target[r]; source = -1 stands for 1.
     Angle r of constraint k in turned[k]:turned[k+1] is that of the vector in the rows rising[r] and rising[r] + 1, with
     the factor share[r]; period: of every constraint [rad].
     """
@@ -48,6 +54,7 @@ class Constraints(NamedTuple):
     lengths: Index
     open: Array
     drive: Index
+    way: Index
     entry: Index
     column: Index
     parts: int
@@ -61,12 +68,54 @@ class Constraints(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
+def by_drive(way: int, p: float, order: int) -> float:
+    """Return the derivative of f by the drive p, of an order from 0 to 3."""
+    if way == LINEAR:
+        return -p if order == 0 else (-1.0 if order == 1 else 0.0)
+    if way == SQUARE:
+        return -p * p if order == 0 else (-2.0 * p if order == 1 else (-2.0 if order == 2 else 0.0))
+    quarter = (order + (3 if way == SINE else 0)) % 4  # -sin p = -cos(p + 3 pi/2)
+    sign = -1.0 if quarter == 0 or quarter == 3 else 1.0
+    return sign * (math.cos(p) if quarter % 2 == 0 else math.sin(p))
+
+
+@njit(cache=True, error_model="numpy")
+def driven(constraints: Constraints, drives: Functions, k: int, t: float, order: int) -> float:
+    """Return the derivative of f by time, of an order from 0 to 3, of constraint k."""
+    number, way = constraints.drive[k], constraints.way[k]
+    if number < 0:
+        return 0.0
+    if way == LINEAR:
+        return -functions.evaluate(drives, number, t, order)
+    p = functions.evaluate(drives, number, t, 0)
+    if order == 0:
+        return by_drive(way, p, 0)
+    rate = functions.evaluate(drives, number, t, 1)
+    if order == 1:
+        return by_drive(way, p, 1) * rate
+    change = functions.evaluate(drives, number, t, 2)
+    if order == 2:
+        return by_drive(way, p, 2) * rate**2 + by_drive(way, p, 1) * change
+    jerk = functions.evaluate(drives, number, t, 3)
+    return by_drive(way, p, 3) * rate**3 + 3.0 * by_drive(way, p, 2) * rate * change + by_drive(way, p, 1) * jerk
+
+
+@njit(cache=True, error_model="numpy")
+def curvature(constraints: Constraints, drives: Functions, k: int, t: float, one: int, other: int) -> float:
+    """Return C_pp of constraint k times two derivatives of the drive by time, of these orders."""
+    number = constraints.drive[k]
+    if number < 0:
+        return 0.0
+    bend = by_drive(constraints.way[k], functions.evaluate(drives, number, t, 0), 2)
+    return bend * functions.evaluate(drives, number, t, one) * functions.evaluate(drives, number, t, other)
+
+
+@njit(cache=True, error_model="numpy")
 def residual(tile: Tile, constraints: Constraints, drives: Functions, t: float, z: Array, value: Array) -> None:
     """C(q, t); value: (constraints, lanes). The derived rows of z must be filled."""
     width = len(tile)
     for k in range(constraints.size):
-        drive = functions.evaluate(drives, constraints.drive[k], t, 0)
-        total = simd.load(tile, constraints.constant, k * width) + drive
+        total = simd.load(tile, constraints.constant, k * width) + driven(constraints, drives, k, t, 0)
         for p in range(constraints.start[k], constraints.start[k + 1]):
             left, right = constraints.left[p] * width, constraints.right[p] * width
             product = simd.load(tile, constraints.factor, p * width) * simd.load(tile, z, right)
@@ -94,8 +143,7 @@ def rates(tile: Tile, constraints: Constraints, drives: Functions, t: float, out
     """C_t(t), so that C_q v = -C_t; out: (constraints, lanes)."""
     width = len(tile)
     for k in range(constraints.size):
-        drive = functions.evaluate(drives, constraints.drive[k], t, 1)
-        simd.store(out, k * width, simd.spread(tile, drive))
+        simd.store(out, k * width, simd.spread(tile, driven(constraints, drives, k, t, 1)))
 
 
 @njit(cache=True, error_model="numpy")
@@ -137,7 +185,7 @@ def bias(tile: Tile, constraints: Constraints, drives: Functions, t: float, zdot
     """eta = C_qq v v + C_tt, so that C_q a = -eta; out: (constraints, lanes). Derived rows of zdot must be filled."""
     width = len(tile)
     for k in range(constraints.size):
-        total = simd.spread(tile, functions.evaluate(drives, constraints.drive[k], t, 2))
+        total = simd.spread(tile, driven(constraints, drives, k, t, 2))
         for p in range(constraints.start[k], constraints.start[k + 1]):
             left, right = constraints.left[p] * width, constraints.right[p] * width
             if left >= 0:
@@ -154,7 +202,7 @@ def add_power(
     width = len(tile)
     for k in range(constraints.size):
         if constraints.drive[k] >= 0:
-            rate = functions.evaluate(drives, constraints.drive[k], t, 1)
+            rate = driven(constraints, drives, k, t, 1)
             for lane in range(width):
                 power[lane] -= multiplier[k * width + lane] * rate
 

@@ -52,7 +52,7 @@ def pack(fitted: Sequence[Piecewise]) -> Functions:
 
 @njit(cache=True, error_model="numpy")
 def evaluate(functions: Functions, number: int, t: float, derivative: int) -> float:
-    """The derivative 0 to 4 of a function at t; number -1 is the zero function. Pointers (or arrays).
+    """The derivative 0 to 3 of a function at t; number -1 is the zero function. Pointers (or arrays).
 
     Beyond the range the value at its end holds. A billionth of the range past an end still counts as that
     end for the derivatives: the last step of a simulation may miss the horizon by rounding.

@@ -6,11 +6,14 @@
           ── _look ─ kernels.energies, constraints.drift
 
 An integrator's step stands in its own file; `integrators.scheme` chooses it by the type of its settings. A step is cut
-short where functions of time are not smooth (`halts`).
+short where functions of time are not smooth (`halts`). The compiled loop runs for a fraction of a second at a time and
+goes on where it has paused (`marched.Progress`), so that signals are heard and a hopeless run is ended.
 """
 
 from __future__ import annotations
 
+import threading
+import time
 from typing import Any
 
 import numpy as np
@@ -23,7 +26,27 @@ from shoal.mechanics.derived import derive
 from shoal.mechanics.dynamics import Work, loaded, remember
 from shoal.mechanics.halts import RESOLUTION, Halts, elongations, leapt
 from shoal.mechanics.integrators.scheme import adaptive, advance, averages, interpolate, restart
-from shoal.mechanics.marched import Frame, LoopRoom, Marched, frame_type, framed, loop_of, sampled
+from shoal.mechanics.least.work import HERE
+from shoal.mechanics.marched import (
+    BEGUN,
+    CUTS,
+    DONE,
+    ENDING,
+    HALT,
+    NOW,
+    NUMBER,
+    ROOM,
+    SAMPLE,
+    TAKEN,
+    WHOLE,
+    Frame,
+    LoopRoom,
+    Marched,
+    frame_type,
+    framed,
+    loop_of,
+    sampled,
+)
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics.tile import Array, Index, Tile
 
@@ -33,6 +56,15 @@ CHECKS = 64
 """Energy and drift are looked at about so many times in a run of fixed steps."""
 CHECK_EVERY = 4
 """An adaptive run is looked at every so many steps, each of which is worth a dozen looks."""
+PAUSE = 0.1
+"""After about so long [s] the compiled loop returns: unnoticed by who waits, and beside it the return takes no time."""
+WORK = 20_000
+"""Unknowns, times lanes, times steps before the first return: some milliseconds of the cheapest step, and no more than
+about a second of an implicit step with a new factor for each iteration."""
+GROWTH = 4.0
+"""Largest ratio of the numbers of steps until one return and until the next."""
+CREEPING = 10.0
+"""So much faster than now a run may become that is not given up: steps are a sixth of the next ones at most."""
 LOBATTO = 0.5 - 0.5 / np.sqrt(5.0)
 """Inner node of the four-point Lobatto rule on the unit interval, of order 6; its weights are 1/12 and 5/12."""
 
@@ -54,9 +86,36 @@ class March:
             _LOOPS[kinds] = function_pointers.address(loop, (frame_type(frame),))
         self._loop = _LOOPS[kinds]
 
-    def __call__(self) -> None:
-        """Run; the record is in the frame, the state at the end in its room. Holds no lock of the interpreter."""
-        _call(self._loop, self._storage)
+    def __call__(self, stop: threading.Event | None = None) -> None:
+        """Run; the record is in the frame, the state at the end in its room. Holds no lock of the interpreter.
+
+        stop: raises KeyboardInterrupt once this is set, as a thread that waits for others does when it hears a signal.
+        The end of the main thread, which hears signals, is heard as well.
+        """
+        frame, progress = self.frame, self.frame.own.progress
+        steps, before, slow = WORK / (len(frame.tile) * frame.arrays.unknowns + 1.0), (0.0, 0.0), False
+        progress[:] = 0.0
+        while True:
+            progress[ROOM], begin = max(1.0, steps), time.perf_counter()
+            _call(self._loop, self._storage)
+            if progress[DONE]:
+                return
+            if (stop is not None and stop.is_set()) or not threading.main_thread().is_alive():
+                raise KeyboardInterrupt
+            now = progress[NOW], progress[NUMBER]
+            creeping, before = self._creeps(*before, *now), now
+            if creeping and slow:
+                return
+            slow = creeping
+            steps = progress[ROOM] * min(GROWTH, PAUSE / (time.perf_counter() - begin))
+
+    def _creeps(self, begin: float, first: float, now: float, number: float) -> bool:
+        """Return whether a lane is at a singular position, and the run, if ten times as fast, would still not end."""
+        frame = self.frame
+        if not np.any(frame.room.gauss.near == HERE):
+            return False
+        rest, left = frame.own.progress[ENDING] - now, frame.steps - number
+        return bool(CREEPING * left * (now - begin) < rest * (number - first))
 
 
 _LOOPS: dict[tuple[Any, ...], int] = {}
@@ -83,19 +142,24 @@ def loop(frame):  # type: ignore[no-untyped-def]
     times, marker_rows = carray(frame.times, frame.samples), carray(frame.marker_rows, frame.directed)
     stops, marks = carray(frame.halts.times, frame.stops), carray(frame.halts.marks, frame.marks)
     halts = Halts(stops, frame.halts.start, marks)
-    free, last = adaptive(scheme), halts.times.size - 1
-    w.until[0] = np.nextafter(halts.times[0], 0.0) if last >= 0 else np.inf
-    _begin(tile, m, w, k, record, marker_rows, tolerance)
-    ending = times[-1] if free or (last >= 0 and halts.times[last] == times[-1]) else steps * step
+    free, last, own = adaptive(scheme), halts.times.size - 1, k.progress
+    if own[BEGUN] == 0.0:
+        w.until[0] = np.nextafter(halts.times[0], 0.0) if last >= 0 else np.inf
+        _begin(tile, m, w, k, record, marker_rows, tolerance)
+        own[BEGUN], own[TAKEN], own[WHOLE] = 1.0, step, 1.0
+        own[ENDING] = times[-1] if free or (last >= 0 and halts.times[last] == times[-1]) else steps * step
+    ending = own[ENDING]
     snap = RESOLUTION * ending
     check_every = CHECK_EVERY if free else max(1, steps // CHECKS)
-    now, taken, number, cuts, sample, halt, whole = 0.0, step, 0, 0, np.int64(0), 0, True  # see `branch.follow`
+    now, taken, number, cuts, whole = own[NOW], own[TAKEN], int(own[NUMBER]), int(own[CUTS]), own[WHOLE] > 0.0
+    sample, halt, room = np.int64(own[SAMPLE]), int(own[HALT]), number + int(own[CUTS]) + int(own[ROOM])
     while True:
         slack = 1e-9 * (taken if free else step)
         while sample < len(times) and times[sample] <= now + slack:
             _sample(tile, scheme, m, w, k, marker_rows, times[sample] - now, taken, slack, record.samples, sample)
             sample += 1
-        if number == steps or now >= ending:
+        own[DONE] = 1.0 if number == steps or now >= ending else own[DONE]
+        if own[DONE] > 0.0 or number + cuts >= room:
             break
         if halt <= last and now == halts.times[halt]:
             halt += 1
@@ -126,11 +190,15 @@ def loop(frame):  # type: ignore[no-untyped-def]
             _account(tile, scheme, m, w, k, begin, taken, tolerance)
         due = (number + cuts) % check_every == 0 or number == steps or now >= ending
         if due and not _look(tile, m, w, k, now, record):
+            own[DONE] = 1.0
             break
+    own[NOW], own[TAKEN], own[NUMBER], own[CUTS], own[WHOLE] = now, taken, number, cuts, 1.0 if whole else 0.0
+    own[SAMPLE], own[HALT] = sample, halt
     for lane in range(len(tile)):
         record.steps[lane] = number + cuts
         record.evaluations[lane] = scheme.evaluations[0]
         record.reached[lane], record.closeness[lane] = now, w.gauss.closeness[lane]
+        record.singular[lane] = w.gauss.near[lane]
     for i in range(2 * len(tile)):
         record.ended[i] = w.gauss.ended[i]
 

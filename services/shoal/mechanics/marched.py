@@ -17,6 +17,12 @@ from shoal.mechanics.numerics.tile import Array, Index, Tile
 
 TURN = 2.0 * np.pi
 
+BEGUN, DONE, ROOM, NOW, ENDING, TAKEN, WHOLE, NUMBER, CUTS, SAMPLE, HALT = range(11)
+"""Progress of the loop: whether it has begun and is done; after how many more steps it returns; the time that it has
+reached and at which it ends [s]; the length of the last step [s], and whether that led to a whole step of a fixed
+length; and the numbers of whole steps, of others, of samples and of halts so far."""
+PROGRESS = 11
+
 
 class Marched(NamedTuple):
     """Record of the time loop. samples: (times * markers * sampled(d), lanes), see `sampled`; the rest: (lanes,).
@@ -24,7 +30,7 @@ class Marched(NamedTuple):
     energy_error: largest |E + dissipated - E(0)| [J]; energy_scale: largest energy in motion [J], kinetic, of
     bent bodies and the size of that of springs; drift: largest violation of a constraint by its power of a length,
     (POWERS * lanes,); begin: coordinates and rates at the start, made consistent, (2 * unknowns, lanes);
-    ended, closeness: as in `GaussWork`, (2 * lanes,) and (lanes,).
+    ended, closeness, singular: as in `GaussWork` (near), (2 * lanes,) and (lanes,).
     Common to the lanes of a tile: steps taken, evaluations of the forces, the time reached [s].
     """
 
@@ -35,6 +41,7 @@ class Marched(NamedTuple):
     begin: Array
     ended: Array
     closeness: Array
+    singular: Array
     steps: Array
     evaluations: Array
     reached: Array
@@ -46,7 +53,7 @@ class LoopRoom(NamedTuple):
     past: coordinates, rates and accelerations at the beginning of the step, (3 * unknowns, lanes). q, v: the motion
     inside it, (rows, lanes). turns [rad], above: whole turns of every marker's direction, and on which side of the x
     axis it was, (markers, lanes). energy, start, dissipated [J], power, last_power [W]: (lanes,). gap, elongation: by
-    constraint and by force element.
+    constraint and by force element. progress: where the loop goes on, see `BEGUN`.
     """
 
     past: Array
@@ -61,6 +68,7 @@ class LoopRoom(NamedTuple):
     last_power: Array
     gap: Array
     elongation: Array
+    progress: Array
 
 
 @njit(cache=True)
@@ -89,6 +97,7 @@ def rooms(tile: Tile, arrays: Arrays, times: int, marker_rows: Index) -> tuple[M
         np.zeros(width),
         np.zeros(width),
         np.zeros(width),
+        np.zeros(width),
     )
     room = LoopRoom(
         np.empty(3 * end),
@@ -103,6 +112,7 @@ def rooms(tile: Tile, arrays: Arrays, times: int, marker_rows: Index) -> tuple[M
         np.zeros(width),
         np.empty(arrays.constraints.size * width),
         np.zeros(arrays.forces.size * width),
+        np.zeros(PROGRESS),
     )
     return record, room
 
@@ -167,11 +177,11 @@ def frame_type(frame: Frame) -> Any:
 
 
 FARTHEST, ENERGY_DRIFT, CONSTRAINT_DRIFT, ENERGY_SCALE = range(4)
-STEPS, EVALUATIONS, REACHED, ENDED, UNCLOSED, CLOSENESS = range(4, 10)
+STEPS, EVALUATIONS, REACHED, ENDED, UNCLOSED, CLOSENESS, SINGULAR = range(4, 11)
 """Rows of the numbers that a run is judged by: the largest distance of a marker from its nearest anchor [m]; the energy
 error over the largest energy in motion; the largest violation of a constraint, relative to the machine's size;
 and as `Marched` has them."""
-NUMBERS = 10
+NUMBERS = 11
 
 
 @njit(cache=True, error_model="numpy")
@@ -225,7 +235,7 @@ def told(
         numbers[ENERGY_SCALE, lane], numbers[STEPS, lane] = record.energy_scale[own], record.steps[own]
         numbers[EVALUATIONS, lane], numbers[REACHED, lane] = record.evaluations[own], record.reached[own]
         numbers[ENDED, lane], numbers[UNCLOSED, lane] = record.ended[own], record.ended[width + own]
-        numbers[CLOSENESS, lane] = record.closeness[own]
+        numbers[CLOSENESS, lane], numbers[SINGULAR, lane] = record.closeness[own], record.singular[own]
 
 
 @njit(cache=True, error_model="numpy")

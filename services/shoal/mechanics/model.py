@@ -104,7 +104,8 @@ class Model:
     triangles of the mass matrix, of the mass added to thin bodies, and of the rods' stiffness against stretching, see
     `Element`; the last is empty where it is not needed. flat: whether accelerations need the added mass. stated: the
     scene as it was given, in whose order the coordinates are numbered; scene: with the start that agrees with its
-    joints. slowed: axial modes whose inertia is raised, see `inertia_cap`.
+    joints. slowed: axial modes whose inertia is raised, see `inertia_cap`. marker_angles: directions of the markers at
+    a start that the scene does not state, counted over full turns [rad], (markers, lanes) or (markers, 1).
     """
 
     scene: Scene
@@ -137,6 +138,7 @@ class Model:
     baumgarte: float
     rubbing: Rubbing
     slowed: int = 0
+    marker_angles: Array | None = None
     shared_tiles: dict[int, Arrays] = field(default_factory=dict, compare=False, repr=False)
     """Arrays by tile width, where no number but the initial state depends on the lane."""
 

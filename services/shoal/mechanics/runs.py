@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache, cached_property
+from threading import Event
 from typing import Any
 
 import numpy as np
@@ -34,7 +35,6 @@ from shoal.mechanics.still import Still
 from shoal.mechanics.verdict import Limits
 from shoal.mechanics.workspace import Workspace
 from shoal.scene import Rod, Scene
-from shoal.scene.ended import End
 from shoal.scene.held_drives import held_drives
 from shoal.trajectory import Status, Trajectory, plain
 
@@ -95,7 +95,7 @@ class Runs:
         numbers = np.empty((NUMBERS, moved.lanes))
         limits, floor = self._limits, self._limits.energy_floor(end)
         left: list[tuple[Array, Array, Array]] = []
-        states = States.room(moved, len(times)) if whole else None
+        states, stop = States.room(moved, len(times)) if whole else None, Event()
 
         def march(part: slice) -> None:
             count = part.stop - part.start
@@ -105,7 +105,7 @@ class Runs:
             space = None if seek is not None or not idle else _taken(idle)
             if space is None:
                 space = Workspace(self.scene.solver, moved, self.choice, tile, part, times, halts, seek, spare, whole)
-            record = space.run(moved, part)
+            record = space.run(moved, part, stop)
             record = record if states is None else split(record, states, len(tile), part)
             told(record, len(tile), part.start, turns, limits.anchors, floor, limits.span, motion, numbers)
             if single:
@@ -126,7 +126,11 @@ class Runs:
             for part in parts:
                 march(part)
         else:
-            list(_pool(workers).map(march, parts))
+            try:
+                list(_pool(workers).map(march, parts))
+            except BaseException:
+                stop.set()
+                raise
         status, reasons = limits.verdict(numbers, self.choice, moved.failed)
         largest = np.maximum.reduce(numbers, axis=1)
         facts = pickle.loads(self._found[single])
@@ -301,6 +305,7 @@ def _taken(idle: list[Workspace]) -> Workspace | None:
 
 def _turns(scene: Scene, model: Model) -> Array:
     """Whole turns in the stated directions of the markers [rad], (markers, lanes) or (markers, 1)."""
-    known = scene.initial_from.angles if isinstance(scene.initial_from, End) else {}
-    begins = stacked([known.get(name, start_angle(model.scene, marker)) for name, marker in scene.markers.items()])
+    begins = model.marker_angles
+    if begins is None:
+        begins = stacked([start_angle(model.scene, marker) for marker in scene.markers.values()])
     return np.asarray(TURN * np.rint((begins - plane.angle(plane.unit(begins))) / TURN))

@@ -11,7 +11,7 @@ import numpy as np
 
 from shoal.mechanics import plane
 from shoal.mechanics.affine import ROUND_OFF, Affine, fixed
-from shoal.mechanics.constraints import OPEN, Constraints
+from shoal.mechanics.constraints import LINEAR, OPEN, WAYS, Constraints
 from shoal.mechanics.derived import Rows
 from shoal.mechanics.numerics.tile import Array, Number, index, stacked
 from shoal.scene.function import Composed
@@ -152,8 +152,17 @@ class Terms:
             self.dot(name, fixed(axis[:, None]), vector, 1, drive=drives[k] if drives else None)
 
 
+def drives(terms: Terms) -> dict[int, Term]:
+    """Return for every function of time, by its identity, the first of the terms that follow it."""
+    found: dict[int, Term] = {}
+    for one in terms.held:
+        if one.drive is not None:
+            found.setdefault(id(one.drive.function), one)
+    return found
+
+
 def assemble(terms: Terms, rows: Rows, driven: int, size: float) -> Constraints:
-    """The lists of the collected constraints. Their functions of time are numbered from `driven` on, in their order.
+    """The lists of the collected constraints. Their drives are numbered from `driven` on, in the order of `drives`.
 
     size: a length of the machine [m].
     """
@@ -163,7 +172,8 @@ def assemble(terms: Terms, rows: Rows, driven: int, size: float) -> Constraints:
     factors: list[Number] = []
     column: list[int] = []
     parts: list[tuple[int, int, Number]] = []
-    drive = []
+    numbers = {drive: driven + k for k, drive in enumerate(drives(terms))}
+    drive, way = list[int](), list[int]()
     turned, rising, shares, periods = [0], list[int](), list[Number](), list[Number]()
     for held in terms.held:
         found: dict[int, int] = {}
@@ -196,8 +206,8 @@ def assemble(terms: Terms, rows: Rows, driven: int, size: float) -> Constraints:
         entry.append(len(column))
         turned.append(len(rising))
         periods.append(held.period)
-        drive.append(-1 if held.drive is None else driven)
-        driven += held.drive is not None
+        drive.append(-1 if held.drive is None else numbers[id(held.drive.function)])
+        way.append(LINEAR if held.drive is None else WAYS[held.drive.operations])
 
     return Constraints(
         len(terms.held),
@@ -209,6 +219,7 @@ def assemble(terms: Terms, rows: Rows, driven: int, size: float) -> Constraints:
         index([held.lengths for held in terms.held]),
         stacked([OPEN * size**held.lengths for held in terms.held]),
         index(drive),
+        index(way),
         index(entry),
         index(column),
         len(parts),

@@ -10,7 +10,17 @@ from shoal.mechanics.constraints import OPEN
 from shoal.mechanics.forces import ANGLE, LAW, STIFFNESS
 from shoal.mechanics.functions import value
 from shoal.mechanics.integrators import Choice, facts
-from shoal.mechanics.marched import CONSTRAINT_DRIFT, ENDED, ENERGY_SCALE, FARTHEST, REACHED, STEPS, UNCLOSED
+from shoal.mechanics.least.work import HERE
+from shoal.mechanics.marched import (
+    CONSTRAINT_DRIFT,
+    ENDED,
+    ENERGY_SCALE,
+    FARTHEST,
+    REACHED,
+    SINGULAR,
+    STEPS,
+    UNCLOSED,
+)
 from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import Array, Flags
 from shoal.scene import GROUND, Function, Scene
@@ -25,6 +35,12 @@ RESOLVED = 1e4
 
 REACH = "let the drives ask for no more than the joints can reach"
 """Advice where a machine is driven."""
+
+CROSSING = (
+    "the machine is at a singular position there, where branches of its motion cross and so small a motion does not "
+    "show which one it is on; begin it farther away from that position, or with rates (initial, drives)"
+)
+"""Reason and advice where a motion creeps at a singular position."""
 
 _JUDGED = slice(FARTHEST, CONSTRAINT_DRIFT + 1)
 """What has a largest value."""
@@ -108,11 +124,12 @@ class Limits:
             return Status.FAILED, "no start agrees with the joints and with what is stated"
         if not finite and numbers[UNCLOSED] >= 0:
             return Status.DRIFTED if self._driven else Status.DIVERGED, self._open(numbers)
-        if not finite and np.isfinite(energy_drift) and adaptive and steps >= self._solver.max_steps:
-            return Status.FAILED, (
-                f"{steps:.0f} steps of {choice.name} led to {numbers[REACHED]:.4g} s only; "
-                "raise solver.max_steps or solver.relative_tolerance"
-            )
+        singular = numbers[SINGULAR] == HERE
+        if not finite and np.isfinite(energy_drift) and adaptive and (singular or steps >= self._solver.max_steps):
+            there = f"{steps:.0f} steps of {choice.name} led to {numbers[REACHED]:.4g} s only"
+            if singular:
+                return Status.FAILED, f"{there}: {CROSSING}"
+            return Status.FAILED, f"{there}; raise solver.max_steps or solver.relative_tolerance"
         if not finite:
             advice = "no step is short enough for it" if adaptive else "use a smaller step"
             ended = f"the motion is not finite {self._since(numbers[ENDED])}"

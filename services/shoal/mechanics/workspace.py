@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from threading import Event
 from typing import Any, TypeVar
 
 import numpy as np
@@ -109,13 +110,16 @@ class Workspace:
         frame, n = self.march.frame, self._model.unknowns
         return frame.own.q[:n].copy(), frame.own.v[:n].copy(), frame.room.memory.copy()
 
-    def run(self, model: Model, part: slice) -> Marched:
-        """The record of a march from the start of a model that differs in its start only; good until the next one."""
+    def run(self, model: Model, part: slice, stop: Event | None = None) -> Marched:
+        """The record of a march from the start of a model that differs in its start only; good until the next one.
+
+        stop: as for `March`.
+        """
         np.copyto(self._block, self._start)
         if model is not self._model or part != self._part:
             frame = self.march.frame
             put_at_start(model, self._tile, part, frame.arrays, frame.room)
-        self.march()
+        self.march(stop)
         if self._sought is not None and self._sought.error is not None:
             raise self._sought.error
         return self.march.frame.record

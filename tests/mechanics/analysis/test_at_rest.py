@@ -12,9 +12,12 @@ from scipy.special import ellipe, ellipk
 from shoal.engines import get_engine
 from shoal.engines.verification import verified
 from shoal.errors import InputError
+from shoal.mechanics.analysis.course import Course, machine, machines
+from shoal.mechanics.analysis.felt import lane_of, lanes_of
 from shoal.mechanics.analysis.modes import modes
 from shoal.mechanics.analysis.reactions import states
 from shoal.mechanics.analysis.statics import statics
+from shoal.mechanics.simulate import simulate
 from shoal.scene import Scene
 
 HEIGHT, YOUNG, DENSITY, LENGTH, FORCE = 0.02, 2e9, 1000.0, 1.0, 1e-3
@@ -246,3 +249,57 @@ def test_nothing_starts_where_nothing_holds_it() -> None:
 def test_engines_that_know_no_statics_refuse_it() -> None:
     with pytest.raises(InputError, match=r"^initial.from: engine casadi cannot do starts at rest; use gauss$"):
         get_engine("casadi").simulate(blade())
+
+
+STIFFNESS, INERTIA, WOUND, TORQUE, PACE, RIM = 8.0, 0.5, 5.0, 0.7, 3.0, 0.3
+
+
+def wheel(angle: float = 0.0) -> Scene:
+    """A wheel at rest where its spring has wound it, most of a turn from where it is stated; a torque drives it."""
+    ground, at = {"body": "ground", "point": [0.0, 0.0]}, {"body": "wheel"}
+    spring = {"kind": "torsion-spring", "first": ground, "second": at, "stiffness": STIFFNESS, "angle": WOUND}
+    torque = {"kind": "torque", "at": at, "torque": f"{TORQUE}*sin({PACE}*t)"}
+    body = {"kind": "rigid-body", "mass": 2.0, "inertia": INERTIA, "centre_of_mass": [0.0, 0.0]}
+    return Scene.parse(
+        {
+            "name": "wheel",
+            "bodies": {"wheel": body},
+            "joints": {"O": {"first": ground, "second": at}},
+            "loads": {"spring": spring, "torque": torque},
+            "markers": {"rim": {"body": "wheel", "point": [RIM, 0.0]}, "hub": at},
+            "initial": {"from": "statics", "wheel": {"angle": angle}},
+            "gravity": [0.0, 0.0],
+            "solver": {"duration": 2.0, "samples": 40},
+        }
+    )
+
+
+def swing(t: Any) -> tuple[Any, Any, Any]:
+    """Angle from rest [rad], rate and acceleration of J x'' + k x = T sin(w t)."""
+    own = np.sqrt(STIFFNESS / INERTIA)
+    size = TORQUE / (STIFFNESS - INERTIA * PACE**2)
+    x = size * (np.sin(PACE * t) - PACE / own * np.sin(own * t))
+    rate = size * PACE * (np.cos(PACE * t) - np.cos(own * t))
+    return x, rate, size * PACE * (own * np.sin(own * t) - PACE * np.sin(PACE * t))
+
+
+@pytest.mark.parametrize("how", ["states", "lanes", "course", "courses"])
+def test_turns_are_counted_from_where_statics_puts_the_machine(how: str) -> None:
+    """They were counted from the stated angles: a spring wound by 5 rad was felt as one wound by 5 - 2 pi."""
+    scene, values = wheel(), {"bodies.wheel.mass": np.full(2, 2.0)}
+    times = np.linspace(0.0, 2.0, 41)
+    run = simulate(scene, times, values, whole=True)
+    assert run.ok, run.message
+    x, rate, change = swing(times)
+    assert run.angles[:, 0, 1] == pytest.approx(WOUND + x, abs=1e-8)
+    parts = run.points, run.velocities, run.angles, run.rates
+    course = Course(times, *(part[:, 1:] for part in parts if part is not None))
+    felt = {
+        "states": lambda: lane_of(run.states, times, scene, values, 1),
+        "lanes": lambda: list(lanes_of(run.states, times, [0, 1]))[1],
+        "course": lambda: machine(scene, values, course, 1),
+        "courses": lambda: list(machines(scene, values, course, [0, 1]))[1],
+    }[how]()
+    expected = np.stack([-RIM * rate**2, RIM * change], axis=1)
+    assert felt.specific_force(scene.markers["rim"]) == pytest.approx(expected, abs=1e-7)
+    assert felt.turns[:, 0] == pytest.approx(WOUND + x, abs=1e-8)

@@ -32,7 +32,9 @@ def begun(model: Model, scenes: Sequence[Scene] | None = None) -> Model:
     found = [_equilibrium(scene) for scene in scenes or [model.stated]]
     places = np.stack([one.q for one in found], axis=1)
     angles = start_angles(model, [one.turns for one in found])
-    return replace(model, q0=places, v0=np.zeros_like(places), start_angles=angles, shared_tiles={})
+    markers = np.stack([one.angles for one in found], axis=1)
+    still = np.zeros_like(places)
+    return replace(model, q0=places, v0=still, start_angles=angles, marker_angles=markers, shared_tiles={})
 
 
 def at_start(scene: Scene, *, horizon: float = 0.0) -> Evaluator:

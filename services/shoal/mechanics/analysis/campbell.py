@@ -53,12 +53,13 @@ class Campbell:
     @property
     def message(self) -> str:
         """Return why there are no modes, or the speeds at which a motion is unstable."""
-        grows = [
-            f"{speed:g}"
+        grows = {
+            f"{speed:g}": next(mode.movers for mode in found.modes if mode.kind == "unstable")
             for speed, found in zip(self.speeds, self.modes, strict=True)
             if found is not None and found.verdict[0] == "unstable"
-        ]
-        unstable = f"a motion grows at {', '.join(grows)} rad/s" if grows else ""
+        }
+        moving = "; ".join(dict.fromkeys(grows.values()))
+        unstable = f"a motion grows at {', '.join(grows)} rad/s, of {moving}" if grows else ""
         return "; ".join(filter(None, (self.verdict[1], unstable)))
 
     @property

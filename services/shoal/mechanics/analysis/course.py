@@ -46,6 +46,8 @@ class _Rigid:
         own = (course.places, course.angles, course.velocities, course.rates)
         self._places, self._angles, velocities, rates = (part[..., lane][:, order] for part in own)
         self._frames = list(model.frames.values())
+        stated = [np.ravel(model.scene.start(name).angle) for name in model.frames]
+        self._stated = np.array([angle[of_model % angle.size] for angle in stated])
         found = points([vector for frame in self._frames for vector in frame.vectors], model.unknowns, of_model)
         matrix = found.matrix.reshape(found.constant.size, model.unknowns)
         # Moving points of the ground are the first unknowns (`place`), known by their functions.
@@ -71,16 +73,21 @@ class _Rigid:
         return np.concatenate(parts, axis=1)
 
     def way(self) -> tuple[Array, Index]:
-        """Poses close enough to count turns, see `Evaluator.along`: far ones are joined by even turns."""
-        way, sample = [self.q[:1]], [0]
-        turned = np.max(np.abs(np.diff(self._angles, axis=0)), axis=1, initial=0.0)
-        for k, count in enumerate(np.ceil(turned / TURN).astype(int).tolist(), start=1):
+        """Poses close enough to count turns, see `Evaluator.along`: far ones are joined by even turns.
+
+        They begin with the bodies turned as stated, where the motion may not begin.
+        """
+        angles = np.concatenate([self._stated[None], self._angles])
+        places, driven = (np.concatenate([part[:1], part]) for part in (self._places, self._driven))
+        way, sample = [self._coordinates(places[:1], angles[:1], driven[:1])], [-1]
+        turned = np.max(np.abs(np.diff(angles, axis=0)), axis=1, initial=0.0)
+        for k, count in enumerate(np.ceil(turned / TURN).astype(int).tolist()):
             if count > 1:
                 share = np.arange(1, count)[:, None] / count
-                place = self._places[k - 1] + share[..., None] * (self._places[k] - self._places[k - 1])
-                angle = self._angles[k - 1] + share * (self._angles[k] - self._angles[k - 1])
-                driven = self._driven[k - 1] + share * (self._driven[k] - self._driven[k - 1])
-                way.append(self._coordinates(place, angle, driven))
+                place = places[k] + share[..., None] * (places[k + 1] - places[k])
+                angle = angles[k] + share * (angles[k + 1] - angles[k])
+                moved = driven[k] + share * (driven[k + 1] - driven[k])
+                way.append(self._coordinates(place, angle, moved))
                 sample += [-1] * (count - 1)
             way.append(self.q[k : k + 1])
             sample.append(k)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -14,7 +15,9 @@ from shoal.mechanics.analysis import triads
 from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.assembly.build import build
 from shoal.mechanics.assembly.groups import place_of
+from shoal.mechanics.ended import named_turns, start_angles
 from shoal.mechanics.frames import BeamFrame, Frame, PointFrame
+from shoal.mechanics.machine import Machine
 from shoal.mechanics.numerics.tile import Array, Index
 from shoal.mechanics.states import States
 from shoal.scene import Attachment, Scene
@@ -127,7 +130,8 @@ def lanes_of(states: States, times: Array, lanes: list[int]) -> Iterator[Felt]:
     """Lanes of a motion whose states are known, on its model."""
     model = states.model
     if model.slowed:  # what moves more slowly than it would is felt as it would move
-        model = build(model.stated, model.lanes, float(times[-1]))
+        begun = {"q0": model.q0, "v0": model.v0, "start_angles": model.start_angles}
+        model = replace(build(model.stated, model.lanes, float(times[-1])), **begun)
     for lane in lanes:
         yield _quantities(Evaluator(model, lane), states, times, lane, lane)
 
@@ -135,7 +139,12 @@ def lanes_of(states: States, times: Array, lanes: list[int]) -> Iterator[Felt]:
 def lane_of(states: States, times: Array, scene: Scene, values: Mapping[str, Array], lane: int) -> Felt:
     """A lane of a motion whose states are known, on a model of its own. Raises InputError."""
     one = scene.with_values({path: float(numbers[lane]) for path, numbers in values.items()})
-    return _quantities(Evaluator.of(one, horizon=float(times[-1])), states, times, lane, 0)
+    model, begun = Machine.of(one).model(float(times[-1])), states.model
+    # It begins where the motion does, be that elsewhere than stated, with the turns counted there.
+    turns = named_turns(begun, begun.start_angles[:, lane % begun.start_angles.shape[1]])
+    q, v = (part[0, :, lane, None].copy() for part in (states.q, states.v))
+    model = replace(model, q0=q, v0=v, start_angles=start_angles(model, [turns]), shared_tiles={})
+    return _quantities(Evaluator(model), states, times, lane, 0)
 
 
 def _quantities(evaluator: Evaluator, states: States, times: Array, lane: int, of_model: int) -> Felt:

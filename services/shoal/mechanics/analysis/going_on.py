@@ -14,11 +14,12 @@ from shoal.errors import InputError
 from shoal.mechanics.affine import Affine
 from shoal.mechanics.analysis import triads
 from shoal.mechanics.analysis.evaluate import Evaluator
+from shoal.mechanics.assembly.groups import start_angle
 from shoal.mechanics.ended import start_angles
 from shoal.mechanics.frames import BeamFrame
 from shoal.mechanics.machine import Machine
 from shoal.mechanics.model import Model
-from shoal.mechanics.numerics.tile import Array
+from shoal.mechanics.numerics.tile import Array, stacked
 from shoal.mechanics.reach import span
 from shoal.scene import Scene
 from shoal.scene.ended import End, mesh_of
@@ -41,7 +42,9 @@ def taken_up(model: Model, state: End) -> Model:
     q, v = (np.stack(columns, axis=1) for columns in zip(*found, strict=True))
     q, v = (np.broadcast_to(part, (model.unknowns, model.lanes)).copy() for part in (q, v))
     angles = start_angles(model, [state.turns] * model.start_angles.shape[1])
-    model = replace(model, q0=q, v0=v, start_angles=angles, shared_tiles={})
+    known, stated = state.angles, model.scene.markers.items()
+    markers = stacked([known.get(name, start_angle(model.scene, marker)) for name, marker in stated])
+    model = replace(model, q0=q, v0=v, start_angles=angles, marker_angles=markers, shared_tiles={})
     for lane in range(model.lanes if model.varies else 1):
         _check_joints(model, lane)
     return model

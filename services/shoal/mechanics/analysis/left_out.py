@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from shoal.mechanics.analysis.evaluate import Evaluator
@@ -13,18 +15,20 @@ STILL = 1e-9
 """Rates below this [m/s or rad/s] are none."""
 
 
-def friction(scene: Scene, reactions: Reactions | None) -> str:
-    """Return which joints have dry friction, and the error of each reaction [N or N m]; empty where none has."""
-    told = []
-    for name, joint in scene.joints.items():
-        if not (isinstance(joint, Revolute | Slider) and joint.dry):
-            continue
+def friction(scene: Scene, react: Callable[[], Reactions] | None) -> str:
+    """Return which joints have dry friction, and the error of each reaction [N or N m]; empty where none has.
+
+    react: returns the reactions, if they are known.
+    """
+    dry = {name: one for name, one in scene.joints.items() if isinstance(one, Revolute | Slider) and one.dry}
+    if not dry:
+        return ""
+    told, reactions = [], None if react is None else react()
+    for name, joint in dry.items():
         pressed = 0.0 if reactions is None else float(np.linalg.norm(reactions.joints[name].force))
         size = joint.coulomb + joint.share * pressed
         unit = "N" if isinstance(joint, Slider) else "N m"
         told.append(name if reactions is None else f"{name}: {size:.3g} {unit}")
-    if not told:
-        return ""
     return f"dry friction is left out ({', '.join(told)}): it may stick at other places, too"
 
 

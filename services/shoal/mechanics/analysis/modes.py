@@ -24,6 +24,7 @@ from shoal.mechanics.analysis.damped import small
 from shoal.mechanics.analysis.equilibrium import Equilibrium
 from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.analysis.going_on import as_stated
+from shoal.mechanics.analysis.movers import movers
 from shoal.mechanics.analysis.singular import crossing
 from shoal.mechanics.analysis.small_motions import hides, pull
 from shoal.mechanics.analysis.statics import statics
@@ -58,7 +59,8 @@ class Mode:
     of the coordinates, real and with shape' M shape = 1 where nothing is damped, (unknowns,). points: displacement
     of the markers, (markers, d); angles: their turns, (markers,). hidden: whether the eigenvalue is 0
     within round-off that may hide a motion that matters. whirl: of a machine that turns, forward, backward
-    or none; rotating: whether the eigenvalue is that in the turning frame, as the motion has several at rest.
+    or none; rotating: whether the eigenvalue is that in the turning frame, as the motion has several at rest. movers:
+    the bodies that it moves, of an unstable one.
     """
 
     eigenvalue: complex
@@ -68,6 +70,7 @@ class Mode:
     hidden: bool = False
     whirl: str = ""
     rotating: bool = False
+    movers: str = ""
 
     @property
     def angular_frequency(self) -> float:
@@ -163,7 +166,9 @@ class Modes:
         if self.moving:
             return "moving", f"{self.moving}; these modes are those at rest, which --speeds 0 takes as the answer"
         if "unstable" in kinds:
-            return "unstable", "it does not stay there: a motion grows"
+            mode = self.modes[kinds.index("unstable")]
+            growth = f"exp(t * {mode.eigenvalue.real:.4g}/s)"
+            return "unstable", f"it does not stay there: a motion of {mode.movers} grows with {growth}"
         if "untold" in kinds:
             numbers = [number for number, kind in enumerate(kinds, 1) if kind == "untold"]
             return "cannot-be-told", f"round-off hides whether anything holds {_named(numbers)}"
@@ -316,7 +321,9 @@ def modes_of_motion(
         raise ComputationError(_singular(scene, names))
     at, turning = _seen(scene, placement, evaluator, motion.q)
     told = tuple(
-        Mode(one.value, one.shape, at @ one.shape, turning @ one.shape, False, one.whirl, one.rotating)
+        _named_movers(
+            Mode(one.value, one.shape, at @ one.shape, turning @ one.shape, False, one.whirl, one.rotating), scene
+        )
         for one in whirls(motion, placement)[:count]
     )
     axis = ", ".join(f"{part:.4g}" for part in np.round(motion.axis, 9) + 0.0)
@@ -358,11 +365,18 @@ def _modes(scene: Scene, evaluator: Evaluator, q: Array, time: float, count: int
     ]
     at, turning = _seen(scene, Machine.of(scene).placement, evaluator, q)
     told = tuple(
-        Mode(complex(value), shape, at @ shape, turning @ shape, unknown)
+        _named_movers(Mode(complex(value), shape, at @ shape, turning @ shape, unknown), scene)
         for value, shape, unknown in list(zip(roots.values, roots.shapes.T, hidden, strict=True))[:count]
     )
     balanced = balance.residual(view) <= BALANCED
     return Modes(scene, about, balanced, message, q, tuple(scene.markers), told)
+
+
+def _named_movers(mode: Mode, scene: Scene) -> Mode:
+    """Name the bodies that an unstable mode moves."""
+    if mode.kind != "unstable":
+        return mode
+    return replace(mode, movers=movers(Machine.of(scene).placement, span(scene), mode.shape))
 
 
 def _seen(scene: Scene, placement: Placement, evaluator: Evaluator, q: Array) -> tuple[Array, Array]:

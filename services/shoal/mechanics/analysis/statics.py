@@ -8,6 +8,7 @@ Dry friction is left out, and drives stand still where they are at the stated ti
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -24,17 +25,17 @@ from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.analysis.going_on import as_stated
 from shoal.mechanics.analysis.idle_spins import idle_spins
 from shoal.mechanics.analysis.joint_reactions import reactions_of
+from shoal.mechanics.analysis.movers import movers
 from shoal.mechanics.analysis.small_motions import LEAST, ROUND, TENSION, hides, pull
 from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.assembly.groups import start_angle
 from shoal.mechanics.ended import named_turns
-from shoal.mechanics.frames import BeamFrame, PointFrame, RigidFrame
+from shoal.mechanics.frames import BeamFrame, RigidFrame
 from shoal.mechanics.machine import Machine
 from shoal.mechanics.numerics.newton import Root
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
 from shoal.scene import Attachment, Scene
-from shoal.scene.ended import End
 from shoal.scene.loads import Torque
 
 TURN = 0.8
@@ -81,9 +82,10 @@ class _Search:
         self.owners = [name for name, of_body in every.items() for _ in of_body]
         self.marker_points = points([self.placement.point(scene, at) for at in scene.markers.values()], unknowns)
         self.marker_lines = points([self.placement.direction(scene, at) for at in scene.markers.values()], unknowns)
-        angles = start_angle if scene.dimensions == plane.DIMENSIONS else self._start_angle
-        known = scene.initial_from.angles if isinstance(scene.initial_from, End) else {}
-        self.angles = np.array([known.get(name, float(angles(scene, at))) for name, at in scene.markers.items()])
+        angles, known = start_angle if scene.dimensions == plane.DIMENSIONS else self._start_angle, None
+        if evaluator.model.marker_angles is not None:
+            known = evaluator.model.marker_angles[:, 0]
+        self.angles = np.array([float(angles(scene, at)) for at in scene.markers.values()]) if known is None else known
         mass = sum(float(body.mass) for body in scene.bodies.values())
         self.balance = Balance(evaluator, time, span(scene), mass)
         self.iterations = self.steps = 0
@@ -206,8 +208,8 @@ class _Search:
         balanced = status is not Held.FAILED and found is not None
         rest = np.zeros_like(q)
         eigenvalues, levels, _ = self._eigen(q)
-        reactions = reactions_of(self.evaluator, q, rest, rest, self.time) if balanced else None
-        notes = message, left_out.friction(self.scene, reactions), left_out.driven(self.evaluator, q, self.time)
+        react = partial(reactions_of, self.evaluator, q, rest, rest, self.time) if balanced else None
+        notes = message, left_out.friction(self.scene, react), left_out.driven(self.evaluator, q, self.time)
         return Equilibrium(
             scene=self.stated,
             time=self.time,
@@ -228,7 +230,7 @@ class _Search:
             levels=levels,
             iterations=self.iterations,
             steps=self.steps,
-            reactions=reactions,
+            react=react,
             turns=named_turns(self.evaluator.model, self.evaluator.turns),
         )
 
@@ -343,6 +345,9 @@ class _Search:
         names = [name for name, load in loads if isinstance(load, Torque) or getattr(load, "follows", False)]
         return ", ".join(names) or "its loads"
 
+    def _movers(self, displacement: Array) -> str:
+        return movers(self.placement, self.balance.size, displacement)
+
     def _follow(self, q: Array) -> None:
         """Count the turns of springs, bodies and markers."""
         self.evaluator.remember(q)
@@ -357,16 +362,6 @@ class _Search:
         """Exclude rotations of bodies about their own axes, which are no motion of the machine."""
         self.balance.left_out = self.balance.left_out[:0]
         self.balance.left_out, self.spinning = idle_spins(self.balance, self.placement, q)
-
-    def _movers(self, displacement: Array) -> str:
-        """The bodies that a displacement moves, most of all first."""
-        sizes = {}
-        for name, frame in self.placement.frames.items():
-            moving = points(_vectors(frame, self.balance.size), len(displacement)).matrix @ displacement
-            sizes[name] = float(np.max(np.linalg.norm(moving, axis=1)))
-        largest = max(sizes.values())
-        ranked = sorted((name for name in sizes if sizes[name] > 0.1 * largest), key=lambda name: -sizes[name])
-        return ", ".join(ranked[:4]) + (", ..." if len(ranked) > 4 else "")
 
 
 def _remainder(change: Array) -> Array:
@@ -387,12 +382,3 @@ def _directions(placement: Placement) -> dict[str, list[Any]]:
             if frame.element.director is not None:
                 found[name] += [node[2] for node in frame.nodes]
     return found
-
-
-def _vectors(frame: Any, size: float) -> list[Any]:
-    """Return vectors [m] that define the motion of a body."""
-    if isinstance(frame, PointFrame):
-        return [frame.origin]
-    if isinstance(frame, RigidFrame):
-        return [frame.origin, *(frame.origin + one * size for one in frame.directors[: len(frame.directors) - 1])]
-    return [node[0] for node in frame.nodes]

@@ -50,14 +50,15 @@ def build(scene: Scene, lanes: int = 1, horizon: float = 0.0, placement: Placeme
     loads = Loads(scene, placement, rows, horizon)
     force_rows = rows.size
     held = terms.assemble(placement.terms, rows, len(loads.fitted), span(scene))
-    for one in placement.terms.held:
-        if one.drive is not None:
-            field = f"joints.{one.name}" if one.name in scene.joints else one.name.replace(GROUND, "ground_points", 1)
-            with naming(field):
-                fitting.require_no_jump(one.drive.function, horizon)
-                if one.name in scene.joints and isinstance(scene.joints[one.name], Distance):
-                    fitting.require_positive(one.drive.function, horizon)
-                loads.fitted.append(fitting.fit(one.drive, horizon, one.drive.knots, steep=False))
+    for one in terms.drives(placement.terms).values():
+        assert one.drive is not None
+        drive = one.drive.function
+        field = f"joints.{one.name}" if one.name in scene.joints else one.name.replace(GROUND, "ground_points", 1)
+        with naming(field):
+            fitting.require_no_jump(drive, horizon)
+            if one.name in scene.joints and isinstance(scene.joints[one.name], Distance):
+                fitting.require_positive(drive, horizon)
+            loads.fitted.append(fitting.fit(drive, horizon, drive.knots, steep=False))
     held_rows = rows.size
     marker_rows = [
         rows.of_all([placement.point(scene, marker), placement.direction(scene, marker)])

@@ -16,7 +16,6 @@ from shoal.compile.pointers import raw
 from shoal.mechanics import constraints, dynamics, kernels
 from shoal.mechanics.derived import derive
 from shoal.mechanics.dynamics import Work
-from shoal.mechanics.functions import evaluate
 from shoal.mechanics.integrators import guess, newton
 from shoal.mechanics.integrators.dense import cubic
 from shoal.mechanics.integrators.newton import Newton, newton_room
@@ -166,8 +165,8 @@ def _count_drives(tile: Tile, m: Arrays, w: Work, newton: Newton, t: float, h: f
     """Take from w.power [W] the mean of what the drives supply, lambda (c(t + h) - c(t)) / h."""
     width = len(tile)
     for k in range(m.constraints.size):
-        drive = m.constraints.drive[k]
-        rate = (evaluate(m.functions, drive, t + h, 0) - evaluate(m.functions, drive, t, 0)) / h
+        begin = constraints.driven(m.constraints, m.functions, k, t, 0)
+        rate = (constraints.driven(m.constraints, m.functions, k, t + h, 0) - begin) / h
         for lane in range(width):
             w.power[lane] -= newton.multiplier[k * width + lane] * rate
 

@@ -17,8 +17,8 @@ from numba import njit
 
 from shoal.compile.pointers import raw
 from shoal.mechanics import dynamics, kernels
+from shoal.mechanics.constraints import driven
 from shoal.mechanics.dynamics import Work
-from shoal.mechanics.functions import evaluate
 from shoal.mechanics.integrators import guess, newton
 from shoal.mechanics.integrators.dense import cubic
 from shoal.mechanics.integrators.newton import Newton, newton_room
@@ -78,11 +78,10 @@ def step(tile: Tile, scheme: ImplicitGauss, m: Arrays, w: Work, t: float, h: flo
 @njit(cache=True, error_model="numpy")
 def _count_drives(tile: Tile, scheme: ImplicitGauss, m: Arrays, w: Work, t: float, h: float) -> None:
     """Take from w.power [W] what the drives supply at the mean of their rates in the last step and in this one."""
-    width = len(tile)
-    for k in range(m.constraints.size):
-        drive = m.constraints.drive[k]
-        begin, finish = evaluate(m.functions, drive, t, 0), evaluate(m.functions, drive, dynamics.instant(w, t + h), 0)
-        last = evaluate(m.functions, drive, t, 1) if scheme.started[0] == 0.0 else scheme.rate[k]
+    width, c, drives = len(tile), m.constraints, m.functions
+    for k in range(c.size):
+        begin, finish = driven(c, drives, k, t, 0), driven(c, drives, k, dynamics.instant(w, t + h), 0)
+        last = driven(c, drives, k, t, 1) if scheme.started[0] == 0.0 else scheme.rate[k]
         scheme.rate[k] = (finish - begin) / h
         for lane in range(width):
             w.power[lane] -= scheme.newton.multiplier[k * width + lane] * 0.5 * (last + scheme.rate[k])

@@ -1,17 +1,19 @@
 """Tangent of the branch of the motion at a singular position, and the rows that keep the acceleration on the branch.
 
 At a singular position combinations u of constraints vanish (u' C_q = 0) and restrict the motion to higher order only.
-For constraints that are quadratic in the coordinates, velocities satisfy u' (C_qq v v + C_tt) = 0, the tangent cone of
-the configuration space: one line for each branch of a linkage that crosses there. The acceleration then satisfies
-3 u' C_qq x a = -u' C_ttt, a linear row, with the tangent x = v. Rows of constraints that are redundant everywhere
-vanish.
+Drives p(t) are coordinates as q is, so that all derivatives are those of the geometry C(q, p) of the machine. For
+constraints that are quadratic in q, velocities satisfy u' (C_qq v v + C_pp p' p') = 0, the tangent cone of the
+configuration space: one line for each branch of a linkage that crosses there. The acceleration then satisfies
+u' C_qq x a = -u' C_pp p' p'', a linear row, with the tangent x = v. Along a branch all derivatives by time have its
+direction to lowest order, so that rows hold near the singular position however slowly a motion begins. Rows of
+constraints that are redundant everywhere vanish.
 
 The velocity satisfies the cone up to round-off and truncation only. Near rest round-off is all of it, and the rows of
 such a velocity would leave the machine no acceleration at all. So v is first projected onto the cone (Gauss-Newton on
 u' C_qq x x / |x|^2 in the mass metric). At rest the tangent is the direction of the acceleration, which satisfies
-u' C_qq a a = 0 by the fourth derivative: a fixed point of the tangent and the acceleration of least constraint along
-it, sought from the minimiser first, then from other directions. Where no branch accelerates, the machine stays at rest.
-A drive that sets out from rest adds C_tttt: u' C_qq a a = -u' C_tttt / 3.
+u' (C_qq a a + C_pp p'' p'') = 0 by the fourth derivative: a fixed point of the tangent and the acceleration of least
+constraint along it, sought from the minimiser first, then from other directions. Where no branch accelerates, the
+machine stays at rest.
 """
 
 from __future__ import annotations
@@ -39,8 +41,8 @@ ON_CONE = 1e-3
 AWAY = 0.1
 """A velocity that its projection changes by more than this fraction is round-off where the machine hardly moves."""
 FAR = 1e3
-"""Distance of a start, relative to the minimiser, from which Newton's method ends at the outer root of its side; it
-halves each time, ten of ROUNDS."""
+"""Distance of a start, relative to what drives ask for, from which Newton's method ends at the outer root of its side;
+it halves each time, ten of ROUNDS."""
 SLOWEST = 1e-9
 """Acceleration along a branch, relative to that without its rows, that is none."""
 SETTLED = 1e-9
@@ -77,15 +79,20 @@ def is_real(tile: Tile, m: Arrays, w: GaussWork, s: LaneWork, t: float, v: Array
 
 
 @njit(cache=True, error_model="numpy")
-def power(tile: Tile, m: Arrays, w: GaussWork, s: LaneWork, v: Array, lane: int, first: int, rank: int) -> float:
-    """Return the power [W] of the rows from `first` on, whose changes are in s.wanted: a part of the work of drives."""
-    width = len(tile)
+def _combine(tile: Tile, m: Arrays, w: GaussWork, s: LaneWork, lane: int, first: int, rank: int, part: Array) -> None:
+    """Put the sum of the basis rows from `first` on, times these parts, into w.extra as a change of the coordinates."""
     for i in range(m.unknowns):
         total = 0.0
         for j in range(first, rank):
-            total += s.wanted[j] * s.rows[j, i]
-        w.extra[i * width + lane] = total
+            total += part[j] * s.rows[j, i]
+        w.extra[i * len(tile) + lane] = total
     sparse.backward(tile, m.pattern, m.mass_factor, m.mass_root, w.extra, 0)
+
+
+@njit(cache=True, error_model="numpy")
+def power(tile: Tile, m: Arrays, w: GaussWork, s: LaneWork, v: Array, lane: int, first: int, rank: int) -> float:
+    """Return the power [W] of the rows from `first` on, whose changes are in s.wanted: a part of the work of drives."""
+    _combine(tile, m, w, s, lane, first, rank, s.wanted)
     return crossing.power(tile, m, w, v, w.extra, lane)  # type: ignore[no-any-return]
 
 
@@ -121,6 +128,7 @@ def follow(
         rank, off = _rows(tile, m, w, s, t, lane, first, velocity, approaching, s.shift)
         if rank == first and off <= ON_CONE:
             return first, False  # redundant everywhere
+        _meet(tile, m, w, s, t, lane, first)
         rank, off = _approach(tile, m, w, s, t, lane, first, velocity)
         away = _difference(width, n, lane, w.branch, v)
         if off > ON_CONE or away > AWAY * speed:
@@ -134,17 +142,19 @@ def follow(
     size = _largest(width, n, lane, w.extra)
     driven = _is_driven(m, t, np.int64(ACCELERATION))
     for seed in range(-1, 2 * n if driven else n):
-        if driven:
-            _accelerate(tile, m, w, s, forces, lane, first)
+        if driven:  # the drive sets how fast: what is free is only added
+            _combine(tile, m, w, s, lane, np.int64(0), first, s.wanted)
+            size = _largest(width, n, lane, w.extra)
             for i in range(n):
                 w.branch[i * width + lane] = w.extra[i * width + lane]
         if seed >= 0:
             _direct(tile, m, w, s, lane, first, seed % n)
-        if driven and seed >= 0:  # the drive sets how fast: what is free is only added
-            share = (FAR if seed < n else -FAR) * size / _largest(width, n, lane, w.extra)
+        if driven and seed >= 0:
+            free = _largest(width, n, lane, w.extra)
+            share = (FAR if seed < n else -FAR) * size / free if free > 0.0 else 0.0
             for i in range(n):
                 w.extra[i * width + lane] = w.branch[i * width + lane] + share * w.extra[i * width + lane]
-        rank, off = _settle(tile, m, w, s, t, forces, lane, first, SLOWEST * size)
+        rank, off = _settle(tile, m, w, s, t, forces, lane, first, 0.0 if driven else SLOWEST * size)
         if off <= ON_CONE:
             return rank, False
     return first, True
@@ -172,7 +182,7 @@ def _settle(
         for i in range(n):
             w.branch[i * width + lane] = w.extra[i * width + lane]
         rank, off = _approach(tile, m, w, s, t, lane, first, order)
-        if off > ON_CONE or rank == first:
+        if off > ON_CONE:
             break
         rank, _ = _rows(tile, m, w, s, t, lane, first, order, np.bool_(False), s.wanted)
         _accelerate(tile, m, w, s, forces, lane, rank)
@@ -196,6 +206,21 @@ def _direct(tile: Tile, m: Arrays, w: GaussWork, s: LaneWork, lane: int, first: 
 
 
 @njit(cache=True, error_model="numpy")
+def _meet(tile: Tile, m: Arrays, w: GaussWork, s: LaneWork, t: float, lane: int, first: int) -> None:
+    """Bring the tangent in w.branch on to C_q x = -C_t, which rates inside a step of an integrator miss."""
+    width, c = len(tile), m.constraints
+    for k in range(c.size):
+        total = constraints.driven(c, m.functions, k, t, 1)
+        for e in range(c.entry[k], c.entry[k + 1]):
+            total += w.jacobian[e * width + lane] * w.branch[c.column[e] * width + lane]
+        s.weights[k] = -total
+    projection.components(first, s.triangle, s.norms, s.order, s.weights, s.shift)
+    _combine(tile, m, w, s, lane, np.int64(0), first, s.shift)
+    for i in range(lane, m.unknowns * width, width):
+        w.branch[i] += w.extra[i]
+
+
+@njit(cache=True, error_model="numpy")
 def _approach(
     tile: Tile, m: Arrays, w: GaussWork, s: LaneWork, t: float, lane: int, first: int, order: int
 ) -> tuple[int, float]:
@@ -209,12 +234,7 @@ def _approach(
         rank, off = _rows(tile, m, w, s, t, lane, first, order, np.bool_(True), s.shift)
         if rank == first or off <= ROUND_OFF or (number > 0 and off <= projection.NEW and off > 0.1 * before):
             break
-        for i in range(n):
-            total = 0.0
-            for j in range(first, rank):
-                total += s.shift[j] * s.rows[j, i]
-            w.extra[i * width + lane] = total
-        sparse.backward(tile, m.pattern, m.mass_factor, m.mass_root, w.extra, 0)
+        _combine(tile, m, w, s, lane, first, rank, s.shift)
         step, size = _largest(width, n, lane, w.extra), _largest(width, n, lane, w.branch)
         part = min(1.0, size / step) if step > 0.0 else 0.0
         for i in range(n):
@@ -237,8 +257,7 @@ def _rows(
 ) -> tuple[int, float]:
     """Extend the basis by the rows u' C_qq x of the tangent x in w.branch.
 
-    Returns the new rank and the distance of x from the cone, |u' C_qq x x + u' C_tt| relative to the size of its terms;
-    of an acceleration C_tttt / 3 takes the place of C_tt.
+    Returns the new rank and the distance of x from the cone, relative to the size of its terms.
     order: VELOCITY or ACCELERATION. approaching: the targets, which go into `wanted`, bring the tangent onto the cone;
     otherwise they are those of the acceleration. Where no drive moves, x is known up to its length, and rows are taken
     of u' C_qq x x / |x|^2, whose gradient vanishes along x.
@@ -255,11 +274,8 @@ def _rows(
         projection.dependence(number, first, s.triangle, s.norms, s.order, s.weights)
         bend, kick = 0.0, 0.0
         for k in range(count):
-            if c.drive[k] >= 0 and order == VELOCITY:
-                bend += s.weights[k] * functions.evaluate(m.functions, c.drive[k], t, 2)
-                kick += s.weights[k] * functions.evaluate(m.functions, c.drive[k], t, 3)
-            elif c.drive[k] >= 0:
-                bend += s.weights[k] * functions.evaluate(m.functions, c.drive[k], t, 4) / 3.0
+            bend += s.weights[k] * constraints.curvature(c, m.functions, k, t, order, order)
+            kick += s.weights[k] * constraints.curvature(c, m.functions, k, t, VELOCITY, ACCELERATION)
         crossing.turn(tile, m, w, s.weights, lane, w.extra)
         pace = constraints.pace(tile, c, s.weights, w.branch, lane)
         if not _largest(width, n, lane, w.extra) > STILL * pace:
@@ -281,7 +297,7 @@ def _rows(
         if approaching:
             target = -0.5 * (value + bend)
         elif order == VELOCITY:
-            target = -kick / 3.0
+            target = -kick
         else:
             target = value if driven else 0.0
         share /= _largest(width, n, lane, w.extra)
@@ -296,10 +312,7 @@ def _rows(
 def _is_driven(m: Arrays, t: float, order: int) -> bool:
     """Return whether a drive moves, so that the tangent has its length by it; order: VELOCITY or ACCELERATION."""
     for k in range(m.constraints.size):
-        number = m.constraints.drive[k]
-        if number >= 0 and functions.evaluate(m.functions, number, t, 2) != 0.0:
-            return True
-        if number >= 0 and order == VELOCITY and functions.evaluate(m.functions, number, t, 1) != 0.0:
+        if functions.evaluate(m.functions, m.constraints.drive[k], t, order) != 0.0:
             return True
     return False
 

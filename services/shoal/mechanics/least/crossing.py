@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from shoal.mechanics import constraints, functions
+from shoal.mechanics import constraints
 from shoal.mechanics.derived import derive
 from shoal.mechanics.least.work import GaussWork
 from shoal.mechanics.model import Arrays
@@ -65,15 +65,15 @@ def crosses(tile: Tile, m: Arrays, w: GaussWork, t: float, v: Array, lane: int, 
     """Return whether branches of the motion of one lane cross near it where u'C, u the weights, is singular.
 
     square: |l|^2 in the metric of the inverse mass matrix, with M^-1 l in w.branch. C is in w.residual, dC_q/dt of v in
-    w.turning, and is replaced. Where drives move, time is one more coordinate: v becomes (v, 1) and l (l, u'C_t).
+    w.turning, and is replaced. Drives p are one more coordinate, along p': v becomes (v, 1) and l (l, u'C_p p').
     """
     width, c, n = len(tile), m.constraints, m.unknowns
     speed = np.sqrt(power(tile, m, w, v, v, lane))
     round_off, rate, bend = 0.0, 0.0, 0.0
     for k in range(c.size):
         round_off += abs(weights[k]) * (abs(w.residual[k * width + lane]) + INEXACT * c.open[k * width + lane])
-        rate += weights[k] * functions.evaluate(m.functions, c.drive[k], t, 1) / speed
-        bend += weights[k] * functions.evaluate(m.functions, c.drive[k], t, 2) / speed**2
+        rate += weights[k] * constraints.driven(c, m.functions, k, t, 1) / speed
+        bend += weights[k] * constraints.curvature(c, m.functions, k, t, 1, 1) / speed**2
     along, mixed, across = bend, bend * rate, bend * rate**2
     turn(tile, m, w, weights, lane, w.moved)
     for i in range(lane, n * width, width):

@@ -7,11 +7,11 @@ from numba import njit
 
 from shoal.compile.pointers import pointer
 from shoal.compile.vector import add, clear, copy, subtract
-from shoal.mechanics import constraints, functions, saddle
+from shoal.mechanics import constraints, saddle
 from shoal.mechanics.constraints import Constraints
 from shoal.mechanics.least import crossing
 from shoal.mechanics.least.projection import NOTHING, dot
-from shoal.mechanics.least.work import GaussWork
+from shoal.mechanics.least.work import HERE, GaussWork
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics import sparse
 from shoal.mechanics.numerics.tile import Array, Tile
@@ -60,6 +60,7 @@ def constrain(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array,
     if dropped > 0 and not m.saddle.many:
         return False
     solve(tile, m, w, a, w.gap, a, w.multiplier)
+    clear(tile, w.near, 0)
     if dropped > 0:
         _add_dropped(tile, m, w, t, q, v, a)
     return True
@@ -140,13 +141,14 @@ def _add_dropped(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Arr
                     continue
             else:
                 for j in range(count):
-                    gap -= weights[j] * functions.evaluate(m.functions, c.drive[j], t, 3) / 3.0
+                    gap -= weights[j] * constraints.curvature(c, m.functions, j, t, 1, 2)
             for i in range(n):
                 gap -= rows[rank, i] * a[i * width + lane]
             gap /= dot(rows[rank], moves[rank])
             for i in range(n):
                 a[i * width + lane] += gap * moves[rank, i]
                 change[i * width + lane] += gap * moves[rank, i]
+            w.near[lane] = HERE
             rank += 1
         if m.driven:
             w.power[lane] = crossing.power(tile, m, w, v, change, lane)

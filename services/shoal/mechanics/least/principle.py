@@ -81,6 +81,8 @@ def constrain(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array,
                 rank = rank if _are_redundant(tile, m, w, v, lane, rank) else together.ALONE
             if rank != together.ALONE:
                 together.raise_closeness(w.group, rank, count, lane, w.closeness)
+                for k in range(lane, lane + len(EIGHT)):
+                    w.near[k] = 0.0
                 together.move(w.group, rank, count, n, width, lane, w.gap, a)
                 lent.take_back_from_group(tile, m, w, lane, rank, a)
                 together.multipliers(w.group, rank, count, width, lane, w.multiplier)
