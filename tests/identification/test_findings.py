@@ -27,7 +27,8 @@ def test_codes_are_unique_and_a_rejection_implies_a_verdict_that_is_not_trusted(
     [
         ([], Verdict.IDENTIFIED),
         ([kinds.CURVED], Verdict.IDENTIFIED),
-        ([kinds.CURVED, kinds.VAGUE], Verdict.COMBINATION),
+        ([kinds.CURVED, kinds.VAGUE], Verdict.PARTLY),
+        ([kinds.CONFOUNDED, kinds.VAGUE], Verdict.COMBINATION),
         ([kinds.VAGUE, kinds.HELD_OUT_REFUTES], Verdict.REJECTED),
         ([kinds.NO_TIME, kinds.MISFIT, kinds.NOT_STATIONARY], Verdict.FAILED),
     ],

@@ -12,9 +12,10 @@ _ANOTHER = "look for another minimum (--method multi-start)"
 
 
 class Verdict(StrEnum):
-    """What may be made of an estimate, the worst last. Only the first two are answers."""
+    """What may be made of an estimate, the worst last. Only the first three are answers."""
 
     IDENTIFIED = "identified"
+    PARTLY = "partly identified"
     COMBINATION = "identified up to a combination"
     AMBIGUOUS = "ambiguous"
     REJECTED = "model rejected"
@@ -24,7 +25,7 @@ class Verdict(StrEnum):
     @property
     def trusted(self) -> bool:
         """Return whether the answer can be used."""
-        return self in (Verdict.IDENTIFIED, Verdict.COMBINATION)
+        return self in (Verdict.IDENTIFIED, Verdict.PARTLY, Verdict.COMBINATION)
 
 
 def verdict_of(findings: Iterable[Finding]) -> Verdict:
@@ -38,8 +39,8 @@ def _rejects(code: str, verdict: Verdict, meaning: str, remedy: str = "") -> Kin
     return Kind(code, Severity.REJECTION, meaning, remedy, verdict)
 
 
-def _limits(code: str, meaning: str, remedy: str = "") -> Kind:
-    return Kind(code, Severity.CAUTION, meaning, remedy, Verdict.COMBINATION)
+def _limits(code: str, verdict: Verdict, meaning: str, remedy: str = "") -> Kind:
+    return Kind(code, Severity.CAUTION, meaning, remedy, verdict)
 
 
 def _cautions(code: str, meaning: str, remedy: str = "") -> Kind:
@@ -114,15 +115,20 @@ SEVERAL_MINIMA = _rejects("several-minima", Verdict.AMBIGUOUS, "Several paramete
 
 # An answer for a part of the parameters.
 AT_BOUND = _limits(
-    "at-bound", "A parameter ended at one of its bounds.", "widen the bound, or give the parameter its value there"
+    "at-bound",
+    Verdict.PARTLY,
+    "A parameter ended at one of its bounds.",
+    "widen the bound, or give the parameter its value there",
 )
 CONFOUNDED = _limits(
     "confounded",
+    Verdict.COMBINATION,
     "Some changes of the parameters leave the motion unchanged: only combinations are identifiable.",
     "fix one parameter of each combination, or rely on the quantities that are identifiable",
 )
 VAGUE = _limits(
     "not-identifiable",
+    Verdict.PARTLY,
     "The data narrow a parameter no further than its bounds do.",
     "measure longer or with less noise, or add what is known as a prior",
 )

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from shoal.mechanics.analysis.evaluate import points
+from shoal.mechanics.affine import points
 from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.frames import PointFrame, RigidFrame
 from shoal.mechanics.numerics.tile import Array
