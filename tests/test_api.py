@@ -43,7 +43,7 @@ def problem() -> shoal.Problem:
 
 @pytest.fixture(scope="module")
 def estimate(problem: shoal.Problem) -> Estimate:
-    run = shoal.simulate("single-pendulum", np.linspace(0, 1, 21), values={"initial.OA.angle": 0.3}, verify=False)
+    run = shoal.simulate("single-pendulum", np.linspace(0, 1, 21), set={"initial.OA.angle": 0.3}, verify=False)
     x, y = run.marker("A").T
     return shoal.identify(problem, pd.DataFrame({"t": run.times, "x": 100 * x, "y": 100 * y}))
 
@@ -64,7 +64,7 @@ def test_simulate_verifies_sets_values_and_takes_scenes(motion: shoal.Trajectory
     assert motion.model["verification"]["time_error"] < 1e-6
     scene = shoal.load_scene("single-pendulum").with_values({"initial.OA.angle": 0.3})
     by_scene = shoal.simulate(scene, TIMES)
-    by_values = shoal.simulate("single-pendulum", TIMES, values={"initial.OA.angle": 0.3})
+    by_values = shoal.simulate("single-pendulum", TIMES, set={"initial.OA.angle": 0.3})
     np.testing.assert_array_equal(by_scene.points, by_values.points)
     with pytest.raises(InputError, match="gauss only"):
         shoal.simulate(scene, engine="exudyn", tolerance=1e-3)
@@ -161,8 +161,8 @@ def test_a_problem_is_an_object_its_fields_or_a_file(problem: shoal.Problem, tmp
 
 
 def test_values_may_be_of_numpy() -> None:
-    by_list = shoal.simulate("single-pendulum", TIMES, values={"gravity": [0.0, -9.0]}, verify=False)
-    by_array = shoal.simulate("single-pendulum", TIMES, values={"gravity": np.array([0.0, -9.0])}, verify=False)
+    by_list = shoal.simulate("single-pendulum", TIMES, set={"gravity": [0.0, -9.0]}, verify=False)
+    by_array = shoal.simulate("single-pendulum", TIMES, set={"gravity": np.array([0.0, -9.0])}, verify=False)
     np.testing.assert_array_equal(by_array.points, by_list.points)
 
 

@@ -9,16 +9,13 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-import click
 import numpy as np
 import pytest
 import shoal
 from click.testing import CliRunner
-from shoal.api.operations import OPERATIONS
-from shoal.arguments import LIMITS, numbers
+from shoal.arguments import numbers
 from shoal.cli import main
 from shoal.errors import InputError
-from shoal.response.stated import Stated
 
 PENDULUM, FLEXIBLE, PROBLEM = "single-pendulum", "flexible-double-pendulum", "paper-case-1"
 ANGLE = "initial.OA.angle"
@@ -47,18 +44,18 @@ def _simulate(*given: Any, **asked: Any) -> Callable[[], Any]:
         (lambda: shoal.statics(PENDULUM, "1"), "time: needs a time of at least 0 s, found '1'"),
         (lambda: shoal.statics(FLEXIBLE, tolerance=1e-3, verify=False), "verify: a tolerance is kept by estimates"),
         (lambda: shoal.design(PROBLEM, about="foo"), "about: needs one of answer, start, found 'foo'"),
-        (lambda: shoal.design(PROBLEM, noise="1e-3"), "noise: '1e-3' is no standard deviation"),
+        (lambda: shoal.design(PROBLEM, noise="1e-3"), "noise: needs a standard deviation above 0 m, found '1e-3'"),
         (_uncertain(count=-3), "count: needs a whole number of at least 1, found -3"),
         (_uncertain(gap=-1), "gap: needs a share above 0 and of at most 1, found -1"),
         (_uncertain(gap=NAN), "gap: needs a share above 0 and of at most 1, found nan"),
         (_uncertain(limit_runs=-5), "limit_runs: needs a whole number of at least 100, found -5"),
         (_uncertain(degree=-3), "degree: needs a whole number of at least 1 and of at most 40, found -3"),
-        (_uncertain(most=-1), "most: needs a whole number of at least 3, found -1"),
+        (_uncertain(runs=-1), "runs: needs a whole number of at least 3, found -1"),
         (_uncertain(seed=-1), "seed: needs a whole number of at least 0, found -1"),
         (_uncertain(time_limit=INF), "time_limit: needs a time above 0 s, found inf"),
         (_uncertain(allocate=True, target=0.5), "target: needs a probability above 0 and below 0.5, found 0.5"),
         (_uncertain(target=1e-3), "target: belongs to allocate"),
-        (_uncertain(costs={ANGLE: 2.0}), "costs: belongs to allocate"),
+        (_uncertain(cost={ANGLE: 2.0}), "cost: belongs to allocate"),
         (_uncertain(limit_method="form"), "limit_method: belongs to a limit"),
         (_uncertain(limit_runs=500), "limit_runs: belongs to a limit"),
         (_identify(seed=-1), "seed: needs a whole number of at least 0, found -1"),
@@ -73,18 +70,18 @@ def _simulate(*given: Any, **asked: Any) -> Callable[[], Any]:
         (_simulate(tolerance="1e-3"), "tolerance: needs a length above 0 m, found '1e-3'"),
         (_simulate(tolerance=1e-3, verify=False), "verify: a tolerance is kept by estimates"),
         (
-            lambda: shoal.sweep(PENDULUM, {ANGLE: [0.1, 0.2]}, values={ANGLE: 0.3}),
+            lambda: shoal.sweep(PENDULUM, {ANGLE: [0.1, 0.2]}, set={ANGLE: 0.3}),
             "initial.OA.angle: is set to 0.3 and varied as well",
         ),
-        (_simulate("abc"), "times: needs a list of one or more finite times in s, found 'abc'"),
-        (_simulate(engine=None), "engine: no engine None; there are gauss"),
-        (_simulate(values={1: 1}), "values: 1 is no dotted path of a field"),
-        (_simulate(values={ANGLE: np.array([0.3, 0.4])}), r"initial.OA.angle: needs a number, found \[0.3, 0.4\]"),
-        (_simulate(values={ANGLE: np.ma.array(0.3, mask=True)}), "values: a masked array is no value of a field"),
+        (_simulate("abc"), "at: needs a list of one or more finite times in s, found 'abc'"),
+        (_simulate(engine=None), "engine: needs a text, found None"),
+        (_simulate(set={1: 1}), "values: 1 is no dotted path of a field"),
+        (_simulate(set={ANGLE: np.array([0.3, 0.4])}), r"initial.OA.angle: needs a number, found \[0.3, 0.4\]"),
+        (_simulate(set={ANGLE: np.ma.array(0.3, mask=True)}), "values: a masked array is no value of a field"),
         (lambda: shoal.simulate(3), "scene: needs a scene, its fields, a name or the path of a YAML file, found 3"),
         (lambda: shoal.identify(3), "problem: needs a problem, its fields, a name or the path"),
         (lambda: shoal.simulate({"name": "x"}), "scene: bodies: Field required"),
-        (lambda: shoal.reactions(PENDULUM, 0.5), "times: needs a list of one or more finite times in s, found 0.5"),
+        (lambda: shoal.reactions(PENDULUM, 0.5), "at: needs a list of one or more finite times in s, found 0.5"),
         (lambda: shoal.compare(PENDULUM, []), r"engines: needs a list of one or more names, found \[\]"),
         (lambda: shoal.compare(PENDULUM, "gauss"), "engines: needs a list of one or more names, found 'gauss'"),
         (lambda: shoal.sweep(PENDULUM, {}), r"vary: needs a mapping of one or more fields with their values, found {}"),
@@ -125,49 +122,6 @@ def test_a_list_of_numbers_becomes_an_array_of_its_own() -> None:
         np.testing.assert_array_equal(numbers("times", same), given)
 
 
-SURFACES = {"most": ("runs",), "time": ()}
-"""Options by the argument they are, where they are called otherwise; an instant is checked by what computes."""
-
-
-def _names(argument: str) -> tuple[str, ...]:
-    return SURFACES.get(argument, (argument,))
-
-
-def test_command_line_and_studies_state_the_limits_of_the_library() -> None:
-    found = 0
-    for command in ("uncertain", "identify", "modes"):
-        for option in main.get_command(click.Context(main), command).params:
-            kind = option.type
-            if option.name in LIMITS and isinstance(kind, click.IntRange | click.FloatRange):
-                limit = LIMITS[option.name]
-                assert isinstance(kind, click.IntRange) == limit.whole
-                assert (kind.min, kind.max) == (limit.gt if limit.ge is None else limit.ge, limit.lt or limit.le)
-                assert (kind.min_open, kind.max_open) == (limit.gt is not None, limit.lt is not None)
-                found += 1
-    assert found >= 12
-    names = {"exclusiveMinimum": "gt", "minimum": "ge", "exclusiveMaximum": "lt", "maximum": "le"}
-    fields = Stated.model_json_schema(by_alias=False)["properties"]
-    for argument, limit in LIMITS.items():
-        for name in _names(argument):
-            if (field := fields.get(name)) is not None:
-                stated = next((one for one in field.get("anyOf", [field]) if names.keys() & one.keys()), {})
-                assert {names[key]: bound for key, bound in stated.items() if key in names} == limit.bounds, name
-
-
-def test_services_take_nothing_that_the_library_refuses() -> None:
-    found = 0
-    for operation, request in OPERATIONS.items():
-        for name in LIMITS.keys() & request.model_fields.keys():
-            limit = LIMITS[name]
-            field = request.model_json_schema()["properties"][name]
-            stated = next(one for one in field.get("anyOf", [field]) if one.get("type") != "null")
-            least = stated.get("exclusiveMinimum", stated.get("minimum"))
-            assert least == (limit.gt if limit.ge is None else limit.ge), (operation, name)
-            assert ("exclusiveMinimum" in stated) == (limit.gt is not None), (operation, name)
-            found += 1
-    assert found >= 15
-
-
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -194,13 +148,13 @@ def test_a_client_sends_no_number_that_is_not_finite(wrong: Any) -> None:
     """JSON would write null, and the service take its default; nobody listens there, so that nothing was sent."""
     client = shoal.Client("http://127.0.0.1:9")
     for call, field in (
-        (lambda: client.simulate(PENDULUM, values={ANGLE: wrong}), f"values.{ANGLE}"),
+        (lambda: client.simulate(PENDULUM, set={ANGLE: wrong}), f"set.{ANGLE}"),
         (lambda: client.simulate(PENDULUM, tolerance=wrong), "tolerance"),
-        (lambda: client.simulate(PENDULUM, [0.5, wrong]), "times"),
+        (lambda: client.simulate(PENDULUM, [0.5, wrong]), "at"),
         (lambda: client.sweep(PENDULUM, {ANGLE: [0.1, wrong]}), f"vary.{ANGLE}"),
         (lambda: client.identify(PROBLEM, time_limit=wrong), "time_limit"),
     ):
         with pytest.raises(InputError, match=f"^{field}: needs a finite number, found (nan|inf)$"):
             call()
     with pytest.raises(InputError, match="cannot be sent"):
-        client.simulate(PENDULUM, values={ANGLE: 0.1j})
+        client.simulate(PENDULUM, set={ANGLE: 0.1j})

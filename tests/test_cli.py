@@ -130,7 +130,7 @@ def test_a_printed_scene_can_be_simulated_again(tmp_path: Path) -> None:
         (["sweep", "single-pendulum", "--vary", "bodies.OA.mass=1:2:1"], "1:2:1: one value is not at both ends"),
         (["simulate", "single-pendulum", "--set", "bodies.OA.mass=1", "--set", "bodies.OA.mass=2"],
          "bodies.OA.mass is given twice, as 1 and as 2"),
-        (["simulate", "single-pendulum", "--at", "0.1", "--at", "0.2"], "'--at': is given 2 times"),
+        (["simulate", "single-pendulum", "--at", "0.1", "--at", "0.2"], "--at: is given 2 times"),
         (["sweep", "single-pendulum", "--vary", "bodies.OA.mass=1:2:2", "--at", "1", "--at", "2"], "is given 2 times"),
         (["run", "sweep", "--param", "engine=gauss", "--param", "engine=exudyn"], "engine is given twice"),
         (["run", "sweep", "--param", "scene="], "'scene=' is not K=V; there is nothing after the ="),

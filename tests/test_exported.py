@@ -9,6 +9,7 @@ import pytest
 from click.testing import CliRunner
 from shoal.cli import main
 from shoal.fmu.running import identifier
+from shoal.requests.fmu import Fmu
 from shoal.scene import load_scene
 from shoal.scene.edited import as_yaml
 from shoal_flows.exports import exported
@@ -47,7 +48,7 @@ def test_an_exported_machine_is_read_back(tmp_path: Path, monkeypatch: pytest.Mo
     ("arguments", "status", "message"),
     [
         ("single-pendulum --to exudyn --out x.xml", 2, "out: x.xml ends in .xml; exudyn has .py"),
-        ("single-pendulum --to adams", 2, "'adams' is not .*"),
+        ("single-pendulum --to adams", 2, "--to: needs one of exudyn, mjcf, found 'adams'"),
         ("flexible-double-pendulum --to exudyn --set bodies.AB.element=ancf-full", 2,
          "bodies.AB.element: engine exudyn cannot do ancf-full$"),
         ("flexible-double-pendulum --to mjcf", 2, "bodies.OA.element: MJCF has no ancf-cable; rigid bodies only$"),
@@ -90,7 +91,7 @@ def test_files_that_are_called_after_a_scene_stay_in_the_folder(
     Path("s.yaml").write_text(as_yaml(scene.model_dump(mode="json", exclude_unset=True)), encoding="utf-8")
     done = CliRunner().invoke(main, ["export", "s.yaml", "--to", "mjcf", "--no-verify"])
     assert (done.exit_code, done.stdout) == (0, f"{file}.xml\n"), done.output
-    found = exported("s.yaml", ["mjcf", "csv"], {"solver.duration": 0.01}, verify=False)
+    found = exported(Fmu("s.yaml", set={"solver.duration": 0.01}), ["mjcf", "csv"], verify=False)
     assert {*found.files} == {f"{file}.xml", f"{file}.csv"}
     assert re.fullmatch(r"[A-Za-z_]\w{0,50}", identifier(scene), re.ASCII)
     assert {path.name for path in tmp_path.rglob("*") if path.is_file()} == {"s.yaml", f"{file}.xml"}

@@ -82,7 +82,7 @@ def answers() -> Answers:
         shoal.simulate(CASE, [TIME]),
         shoal.compare(CASE, ["gauss", "exudyn"], [TIME]),
         shoal.sweep(CASE, {"initial.OA.angle": angles}, TIME),
-        shoal.uncertain(CASE, {"initial.OA.angle": ("-2%", "2%")}, [TIME], limits=["B.x > 2.68", "B.x < 2.65"]),
+        shoal.uncertain(CASE, {"initial.OA.angle": ("-2%", "2%")}, [TIME], limit=["B.x > 2.68", "B.x < 2.65"]),
         shoal.statics(THICK),
     )
 
@@ -253,7 +253,7 @@ def test_the_command_line_refuses_to_decide_such_a_limit() -> None:
 def test_probabilities_are_as_wide_as_the_mesh_makes_them() -> None:
     """The margin scatters by 9 mm, and the mesh is 31 mm off: nothing is known of a probability."""
     limits = ["B.x < 2.65"]
-    found = shoal.uncertain(CASE, {"initial.OA.angle": "normal(0.785,0.004)"}, [TIME], limits=limits, limit_runs=500)
+    found = shoal.uncertain(CASE, {"initial.OA.angle": "normal(0.785,0.004)"}, [TIME], limit=limits, limit_runs=500)
     (one,) = found.limits
     assert found.status == "limit-in-doubt"
     assert "may change beta" in found.message
@@ -272,7 +272,7 @@ def test_modes_and_reactions_take_neglected_shear_and_coarse_meshes() -> None:
         assert 0.01 < true < 1.2 * (thin.errors[number].total or 0.0)
     assert f"{thin.errors[0].total:.1e}" in printed(lambda: tables.modes_table(thin))
     assert thin.to_json()["modes"][0]["error"] == thin.errors[0].total
-    coarse, fine = (shoal.reactions(CASE, [0.1], values=values)[0] for values in ({}, FINE))
+    coarse, fine = (shoal.reactions(CASE, [0.1], set=values)[0] for values in ({}, FINE))
     away = float(np.hypot(*np.subtract(coarse.joints["O"].force, fine.joints["O"].force)))
     assert away > 1.0
     assert (coarse.joints["O"].force_error or 0.0) > 0.5 * away
@@ -340,7 +340,7 @@ def test_no_limit_is_called_kept_that_the_true_machine_passes(seed: int) -> None
             limits.append(f"e.{axis} > {float(most + away)!r}")
             beyond.append(-float(away))
     end = [scene.solver.duration]
-    found = shoal.uncertain(scene, {"initial.r.angle": (begin - half, begin + half)}, times=end, limits=limits)
+    found = shoal.uncertain(scene, {"initial.r.angle": (begin - half, begin + half)}, at=end, limit=limits)
     assert found.bounds is not None
     for k, axis in enumerate("xy"):
         low, high = (found.column("e", axis, of)[-1] for of in (found.bounds.lower_outer, found.bounds.upper_outer))
@@ -368,8 +368,8 @@ def test_probabilities_of_every_way_are_as_wide_as_the_neglected_inertia_makes_t
     found = shoal.uncertain(
         scene,
         {"initial.r.angle": f"normal({begin!r},{deviation!r})"},
-        times=[scene.solver.duration],
-        limits=[f"e.x > {bound!r}"],
+        at=[scene.solver.duration],
+        limit=[f"e.x > {bound!r}"],
         limit_method=way,
         limit_runs=400,
     )
@@ -384,7 +384,7 @@ def test_a_limit_that_no_run_passes_is_undecided_within_the_known_error() -> Non
     scene = thick_pendulum(np.random.default_rng(1))
     begin = scene.start("r").angle
     vary = {"initial.r.angle": f"normal({begin!r},0.001)"}
-    found = shoal.uncertain(scene, vary, times=[scene.solver.duration])
+    found = shoal.uncertain(scene, vary, at=[scene.solver.duration])
     assert found.statistics is not None
     mean = found.column("e", "x", found.statistics.mean)[-1]
     std = found.column("e", "x", found.statistics.std)[-1]
@@ -393,7 +393,7 @@ def test_a_limit_that_no_run_passes_is_undecided_within_the_known_error() -> Non
     for share, undecided in ((0.5, True), (-0.5, True), (3.0, False), (-3.0, False)):
         limit = f"e.x > {float(mean + share * off)!r}"
         (one,) = shoal.uncertain(
-            *(scene, vary), times=[scene.solver.duration], limits=[limit], limit_method="monte-carlo", limit_runs=100
+            *(scene, vary), at=[scene.solver.duration], limit=[limit], limit_method="monte-carlo", limit_runs=100
         ).limits
         assert bool(one.doubt) is undecided, one.doubt
         low, high = one.interval
@@ -443,7 +443,7 @@ def test_no_limit_is_called_kept_that_the_converged_beam_passes(seed: int) -> No
     begin, half = scene.start("r").angle, rng.uniform(0.002, 0.02)
     fine = {"bodies.r.elements": 16, "solver.step": 2e-4}
     ends = [
-        shoal.simulate(scene, values=fine | {"initial.r.angle": at}, engine="exudyn", verify=False).marker("e")[-1]
+        shoal.simulate(scene, set=fine | {"initial.r.angle": at}, engine="exudyn", verify=False).marker("e")[-1]
         for at in (begin - half, begin, begin + half)
     ]
     true = np.array(ends)
@@ -453,7 +453,7 @@ def test_no_limit_is_called_kept_that_the_converged_beam_passes(seed: int) -> No
             limits.append(f"e.{axis} > {float(true[:, k].max() + away)!r}")
             beyond.append(-float(away))
     when = [scene.solver.duration]
-    found = shoal.uncertain(scene, {"initial.r.angle": (begin - half, begin + half)}, when, limits=limits)
+    found = shoal.uncertain(scene, {"initial.r.angle": (begin - half, begin + half)}, when, limit=limits)
     assert found.bounds is not None
     for k, axis in enumerate("xy"):
         low, high = (found.column("e", axis, of)[-1] for of in (found.bounds.lower_outer, found.bounds.upper_outer))

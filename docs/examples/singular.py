@@ -34,8 +34,8 @@ print(f"{passes} passes in {motion.times[-1]:g} s, off by at most {error:.1e} m"
 
 # %%
 others = {
-    "multipliers": shoal.simulate(scene, values={"solver.acceleration": "kkt"}),
-    "blind to rank": shoal.simulate(scene, values={"solver.rank_tolerance": 1e-14}),
+    "multipliers": shoal.simulate(scene, set={"solver.acceleration": "kkt"}),
+    "blind to rank": shoal.simulate(scene, set={"solver.rank_tolerance": 1e-14}),
     "Exudyn": shoal.simulate(scene, engine="exudyn", verify=False),
 }
 for name, run in others.items():

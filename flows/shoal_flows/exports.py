@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -15,7 +15,8 @@ from shoal.exported import TOOLS, export
 from shoal.fmu.export import export as export_unit
 from shoal.fmu.running import identifier
 from shoal.pictures import files
-from shoal.scene import Scene, load_scene
+from shoal.requests.fmu import Fmu
+from shoal.scene import Scene
 from shoal.trajectory import Trajectory, plain
 from shoal.whole import file_name
 
@@ -53,24 +54,17 @@ class Exports:
         return plain({**told, "files": list(self.files), "distances": self.distances})  # type: ignore[no-any-return]
 
 
-def exported(
-    scene: str,
-    to: Sequence[str],
-    values: Mapping[str, Any],
-    verify: bool = True,
-    parameters: Sequence[str] = (),
-    inputs: Sequence[str] = (),
-) -> Exports:
-    """Every file that is asked for; verify, parameters and inputs are those of the commands.
+def exported(asked: Fmu, to: Sequence[str], verify: bool = True) -> Exports:
+    """Every file that is asked for.
 
     Raises InputError that names what a tool has not, ComputationError where a run fails.
     """
     for form in to:
         if form not in FORMS:
             raise InputError(f"to: no form {form!r}; there are {', '.join(FORMS)}")
-    if FMU not in to and (parameters or inputs):
-        raise InputError("parameters, inputs: are those of a unit; `to` has no fmu")
-    wanted = load_scene(scene).with_values(values)
+    if FMU not in to and (asked.parameter or asked.input):
+        raise InputError("parameter, input: are those of a unit; `to` has no fmu")
+    wanted = asked.machine()
     distances, motion = dict[str, float](), None
     with TemporaryDirectory() as name:
         folder = Path(name)
@@ -80,7 +74,7 @@ def exported(
                 done.save(folder / done.name)
                 distances |= {} if done.distance is None else {form: done.distance}
             elif form == FMU:
-                export_unit(wanted, parameters, folder / f"{identifier(wanted)}.fmu", inputs=inputs)
+                export_unit(wanted, asked.parameter, folder / f"{identifier(wanted)}.fmu", inputs=asked.input)
             else:
                 engine = get_engine("gauss")
                 motion = motion or (verified(engine, wanted) if verify else engine.simulate(wanted))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ from typing import Any
 import shoal
 from shoal.home import processor
 from shoal.identification import Measurement, load_problem
-from shoal.scene import load_scene
+from shoal.scene import Scene
 
 from shoal_flows import provenance
 from shoal_flows.jobs import Cell
@@ -43,9 +42,9 @@ def of_cell(cell: Cell, measurement: Measurement) -> str:
     return _with_code("fit", digest.hexdigest())
 
 
-def of_simulations(what: str, scene: str, values: Mapping[str, Any], *settings: Sequence[Any] | Any) -> str:
-    """Hash runs of one scene. Raises InputError."""
-    return _with_code(what, repr((load_scene(scene).with_values(values).fingerprint, settings)))
+def of_simulations(what: str, scene: Scene, *settings: Any) -> str:
+    """Hash runs of one scene."""
+    return _with_code(what, repr((scene.fingerprint, settings)))
 
 
 def _with_code(what: str, text: str) -> str:

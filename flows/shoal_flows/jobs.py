@@ -2,28 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from shoal.engines import compare as comparing
+from shoal import notebook
 from shoal.engines import get_engine, spot_checks
 from shoal.engines import sweep as sweeping
 from shoal.engines.gauss import GaussEngine
-from shoal.engines.verification import verified
 from shoal.errors import InputError
 from shoal.identification import Estimate, Measurement, identify, load_problem, measure
 from shoal.identification.conclude import Wishes
-from shoal.identification.measure import Windows
+from shoal.notebook import machine, motion
 from shoal.pictures.answer import Answer
+from shoal.requests.simulate import Simulate
+from shoal.requests.sweep import Sweep
 from shoal.response import Response, uncertain
 from shoal.response.limits import read_limits
 from shoal.response.read import parameters
 from shoal.response.stated import load_study
 from shoal.response.worst import Worst, require_case, worst
-from shoal.scene import Scene, load_scene
-from shoal.trajectory import Array, Trajectory
+from shoal.scene import Scene
+from shoal.selection import Selection
+from shoal.trajectory import Trajectory
 
 from shoal_flows import inputs
 
@@ -35,8 +37,7 @@ _POINTS = 300
 class Cell:
     """One optimisation of a study.
 
-    values: fields of the scene to set; tolerance [m]: for which the model is chosen; sample: effective draws from the
-    posterior; label: its readable name
+    values: fields of the scene to set; label: its readable name; the others are those of `shoal identify`
     """
 
     problem: str
@@ -47,6 +48,9 @@ class Cell:
     label: str = ""
     tolerance: float | None = None
     sample: int = 0
+    profiles: bool = False
+    bootstrap: int = 0
+    time_limit: float | None = None
 
     @property
     def title(self) -> str:
@@ -73,7 +77,7 @@ class Fit:
         return next(iter(self.motions.values()))
 
 
-def measured(problem: str, data: str | None = None, hold_out: Windows | None = None) -> Measurement:
+def measured(problem: str, data: str | None = None, hold_out: Any = None) -> Measurement:
     """The motion to fit: read from `data`, or computed as the problem says. Raises InputError.
 
     hold_out: windows [s] that are predicted instead of fitted, in place of those that the recordings state
@@ -92,7 +96,8 @@ def fit(cell: Cell, measurement: Measurement) -> Fit:
         seed=cell.seed,
         measurement=measurement,
         tolerance=cell.tolerance,
-        wishes=Wishes(sample=cell.sample),
+        time_limit=cell.time_limit,
+        wishes=Wishes(cell.profiles, cell.bootstrap, cell.sample),
     )
     return with_motion(cell, estimate)
 
@@ -107,37 +112,38 @@ def with_motion(cell: Cell, estimate: Estimate) -> Fit:
     return Fit(cell, estimate, motions)
 
 
-def simulated(scene: str, engine: str, values: Mapping[str, Any]) -> tuple[Scene, Trajectory]:
-    """A scene with its motion, verified as `shoal simulate` does it. Raises InputError."""
-    wanted = load_scene(scene).with_values(values)
-    return wanted, verified(get_engine(engine), wanted)
+def simulated(asked: Simulate) -> tuple[Trajectory, Scene, Selection | None]:
+    """Return the motion of a scene as `shoal simulate` computes it, with the scene. Raises InputError."""
+    return motion(asked, machine(asked))
 
 
-def compared(scene: str, engines: Sequence[str] | None, values: Mapping[str, Any]) -> comparing.Comparison:
-    """A scene on several engines. Raises InputError."""
-    return comparing.compare(load_scene(scene).with_values(values), engines)
+def answered(name: str, asked: Any) -> Any:
+    """Return what the library's function of that name answers to its request. Raises InputError, ComputationError."""
+    return getattr(notebook, name).answer(asked)
 
 
-def responded(study: str, values: Mapping[str, Any]) -> tuple[Response, list[Worst]]:
-    """A study of uncertain parameters with its worst cases, if any. Raises InputError, ComputationError."""
-    stated = load_study(study)
-    machine = stated.machine().with_values(values)
-    asked = stated.asked()
-    limits = read_limits(asked["limits"], asked["requirements"], machine)
-    require_case(stated.worst_of, limits, machine, parameters(asked["vary"], machine))
-    found = uncertain(machine, **asked)
+def responded(study: str, fields: Mapping[str, Any]) -> tuple[Response, list[Worst]]:
+    """A study of uncertain parameters with its worst cases, if any. Raises InputError, ComputationError.
+
+    fields: of its scene to set, by path, beside those that it states
+    """
+    asked = load_study(study)
+    machine = asked.machine().with_values(fields)
+    limits = read_limits(asked.limit, asked.require, machine)
+    require_case(asked.worst_of, limits, machine, parameters(asked.vary, machine))
+    found = uncertain(replace(asked, checkpoint=None), machine)
     try:
-        return found, worst(found, stated.worst_of)
+        return found, worst(found, asked.worst_of)
     except InputError:
         return found, []
 
 
-def swept(scene: str, grid: Mapping[str, Array], engine: str, time: float | None) -> sweeping.Sweep:
+def swept(asked: Sweep) -> sweeping.Sweep:
     """A scene over a grid, on one core: the others compute other pieces. Raises InputError."""
-    chosen = get_engine(engine)
+    chosen = get_engine(asked.engine)
     if isinstance(chosen, GaussEngine):
         chosen = replace(chosen, threads=1)
-    return sweeping.sweep(load_scene(scene), grid, chosen, time)
+    return sweeping.sweep(asked.machine(), asked.vary, chosen, asked.at)
 
 
 def spot_checked(found: sweeping.Sweep, engine: str) -> sweeping.Sweep:

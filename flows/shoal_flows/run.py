@@ -5,9 +5,12 @@ from __future__ import annotations
 import logging
 import os
 from collections.abc import Callable, Mapping
-from typing import Any, get_args, get_origin, get_type_hints
+from inspect import signature
+from typing import Any
 
 from shoal.errors import ComputationError, InputError, ShoalError
+from shoal.requests.function import plain
+from shoal.requests.request import fields, renamed
 from shoal.scene.load import read_yaml
 
 from shoal_flows import choices, events, server, workers
@@ -66,19 +69,25 @@ def run_flow(name: str, parameters: Mapping[str, Any]) -> Any:
 
 
 def _parsed(flow: str, function: Callable[..., Any], parameters: Mapping[str, Any]) -> dict[str, Any]:
-    parsed = {}
-    types = get_type_hints(function)
-    known = [name for name in types if name != "return"]
-    for name, value in parameters.items():
-        if name not in known:
-            raise InputError(f"{flow}: no parameter {name!r}; there are {', '.join(known) or 'none'}")
-        if isinstance(value, str):
-            try:
-                value = read_yaml(value, f"{flow}: {name}")
-            except InputError as error:
-                raise InputError(f"{error} (write lists as [a, b])") from None
-        a_list = list in {get_origin(one) for one in (types[name], *get_args(types[name]))}
+    parsed = {name: _read(flow, name, value) for name, value in parameters.items()}
+    if (request := getattr(function, "request", None)) is not None:
+        parsed = renamed(request, parsed, lambda said: events.note(f"{flow}: {said}"))
+        numbers = {name: one for name, one in fields(request).items() if name in parsed and one.limit is not None}
+        parsed |= {name: one.read(parsed[name]) for name, one in numbers.items()}
+    types = {name: one.annotation for name, one in signature(function, eval_str=True).parameters.items()}
+    for name, value in parsed.items():
+        if name not in types:
+            raise InputError(f"{flow}: no parameter {name!r}; there are {', '.join(types) or 'none'}")
+        a_list = plain(types[name]).startswith("list[")
         if a_list and value is not None and not isinstance(value, list | dict):
-            value = value.split(",") if isinstance(value, str) else [value]
-        parsed[name] = value
+            parsed[name] = value.split(",") if isinstance(value, str) else [value]
     return parsed
+
+
+def _read(flow: str, name: str, value: Any) -> Any:
+    if not isinstance(value, str):
+        return value
+    try:
+        return read_yaml(value, f"{flow}: {name}")
+    except InputError as error:
+        raise InputError(f"{error} (write lists as [a, b])") from None

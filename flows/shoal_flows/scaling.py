@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from shoal.engines.pieces import joined, pieces
 from shoal.errors import ComputationError
+from shoal.requests.sweep import Sweep
 
 from shoal_flows import cluster, jobs, workers
 
@@ -36,7 +37,7 @@ def cost(number: int) -> Cost:
     client.wait_for_workers(number)
     small = pieces({path: values[:: len(values) // 8] for path, values in VARY.items()}, number)[0]
     for worker in client.nthreads():
-        client.submit(jobs.swept, SCENE, small, "gauss", TIME, workers=[worker], pure=False).result()
+        client.submit(jobs.swept, Sweep(SCENE, small, TIME), workers=[worker], pure=False).result()
     costs = [_once(client) for _ in range(REPEATS)]
     client.cluster.close()
     client.close()
@@ -46,7 +47,7 @@ def cost(number: int) -> Cost:
 def _once(client: Any) -> Cost:
     used = sum(client.run(time.process_time).values())
     begin = time.perf_counter()
-    pending = [workers.submit(jobs.swept, SCENE, piece, "gauss", TIME) for piece in pieces(VARY, workers.count())]
+    pending = [workers.submit(jobs.swept, Sweep(SCENE, piece, TIME)) for piece in pieces(VARY, workers.count())]
     whole = joined([part.result() for part in pending])
     wall = time.perf_counter() - begin
     if not whole.ok:

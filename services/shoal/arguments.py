@@ -47,6 +47,23 @@ class Limit:
             return False
         return math.isfinite(value) and all(_HOLDS[name](value, bound) for name, bound in self.bounds.items())
 
+    def read(self, value: Any) -> Any:
+        """Return a value as a number of Python's. Raises ValueError that says what would be right."""
+        if value is None:
+            return None
+        if not self.holds(value):
+            raise ValueError(f"needs {self}, found {told(value)}")
+        return int(value) if self.whole else float(value)
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        from pydantic_core import core_schema
+
+        return core_schema.no_info_before_validator_function(self.read, handler(source))
+
+    def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> dict[str, Any]:
+        names = {"gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveMaximum", "le": "maximum"}
+        return {**handler(schema), **{names[name]: bound for name, bound in self.bounds.items()}}
+
     def __str__(self) -> str:
         bounds = " and ".join(f"{_WORDS[name]} {bound:g}" for name, bound in self.bounds.items())
         return " ".join(filter(None, (self.what, bounds, self.unit)))

@@ -25,6 +25,7 @@ from shoal.identification.problem import as_problem
 from shoal.identification.recording.reading import YAML, described
 from shoal.identification.recording.source import Channel, FileSource
 from shoal.identification.recording.unit_line import with_units
+from shoal.requests.function import stated
 from shoal.response.read import by_name
 from shoal.scene.load import as_scene
 from shoal.scene.paths import unwrapped
@@ -48,14 +49,14 @@ def _by_service(function: Callable[..., Any], *, job: bool = False) -> Any:
             return self._awaited(self.submit(function.__name__, *args, **kwargs), told)
         request = self._request(function.__name__, *args, **kwargs)
         found = self._answer("POST", f"/v1/{function.__name__}", request, _object)
-        file = signature(function).bind(*args, **kwargs).arguments.get("file")
+        file = stated(function, args, kwargs).get("file")
         if file is not None:
             found.save(Path(file))
         return found
 
-    stated = signature(function)
+    known = signature(function)
     own = Parameter("self", Parameter.POSITIONAL_OR_KEYWORD)
-    method.__signature__ = stated.replace(parameters=[own, *stated.parameters.values()])  # type: ignore[attr-defined]
+    method.__signature__ = known.replace(parameters=[own, *known.parameters.values()])  # type: ignore[attr-defined]
     method.__name__, method.__doc__ = function.__name__, function.__doc__
     return method
 
@@ -141,33 +142,33 @@ class Client:
         """The arguments of a function of the library as the fields of a request. Raises InputError."""
         if not isinstance(getattr(Client, operation, None), Callable) or not hasattr(notebook, operation):  # type: ignore[arg-type]
             raise InputError(f"operation: no operation {operation!r}")
-        given = dict(signature(getattr(notebook, operation)).bind(*args, **kwargs).arguments)
-        given |= given.pop("options", {})
+        function = getattr(notebook, operation)
+        given = stated(function, args, kwargs)
         given.pop("file", None)
         engine = given.pop("engine", None)
-        if engine is not None and engine != (own := self._own()):
-            raise InputError(f"engine: the service at {self._service.name} runs {own}, found {engine!r}")
+        if engine is not None and engine != (there := self._own()):
+            raise InputError(f"engine: the service at {self._service.name} runs {there}, found {engine!r}")
         if "scene" in given:
             given["scene"] = _scene(given["scene"])
-        if (values := given.get("values")) is not None and not isinstance(values, Mapping):
-            found = carried(values)
-            given["values"] = found.values
-            if operation == "sweep":
-                # What is varied is not what was found; only what a caller states may be refused for that.
-                given["values"] = {path: value for path, value in found.values.items() if path not in given["vary"]}
+        if (values := given.pop("values", None)) is not None:
+            found, own = carried(values), dict(given.get("set") or {})
             if "problem" in given:
-                given["problem"], given["values"], _ = found.into(as_problem(given["problem"]))
+                given["problem"], given["set"], _ = found.into(as_problem(given["problem"]), own)
+            else:
+                # What is varied is not what was found; only what a caller states may be refused for that.
+                varied = given["vary"] if operation == "sweep" else ()
+                given["set"] = {path: value for path, value in found.values.items() if path not in varied} | own
         if "problem" in given:
-            given["problem"], given["recordings"] = _problem(given["problem"], given.pop("data", None))
+            given["problem"], given["data"] = _problem(given["problem"], given.pop("data", None))
         if operation == "uncertain":
             given["vary"] = by_name(given["vary"])
-        if (pairs := given.get("correlations")) is not None:
-            given["correlations"] = [[*pair, value] for pair, value in pairs.items()]
-        measured = given.pop("recordings", None)  # the only numbers that may be missing
-        stated = {name: _plain(value, name) for name, value in given.items() if value is not None}
+        if (pairs := given.get("correlate")) is not None:
+            given["correlate"] = [[*pair, value] for pair, value in pairs.items()]
+        measured = given.pop("data", None)  # the only numbers that may be missing
+        sent = {name: _plain(value, name) for name, value in given.items() if value is not None}
         if measured is not None:
-            stated["recordings"] = measured
-        return {**stated, "objects": True}
+            sent["data"] = measured
+        return {**sent, "objects": True}
 
 
 def _object(found: Any) -> Any:
@@ -182,7 +183,7 @@ def _job(found: Answer) -> Answer:
     return {**found, **{name: found[name] for name in ("status", "operation", "progress")}}
 
 
-def _scene(given: notebook.Stated) -> Any:
+def _scene(given: Any) -> Any:
     return given if _is_name(given) else as_scene(given).model_dump(mode="json")
 
 
@@ -191,7 +192,7 @@ def _is_name(given: Any) -> bool:
     return isinstance(given, str) and Path(given).suffix not in YAML
 
 
-def _problem(given: notebook.StatedProblem, data: Any) -> tuple[Any, Answer]:
+def _problem(given: Any, data: Any) -> tuple[Any, Answer]:
     """A problem, with its scene, and its recordings by name. Raises InputError."""
     if _is_name(given):
         return given, {name: _recording(FileSource(), one)[1] for name, one in _by_name(data).items()}

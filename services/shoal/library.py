@@ -90,12 +90,12 @@ def _check_problem(document: Path) -> None:
 
 def _check_study(document: Path) -> None:
     study = load_study(str(document))
-    scene, asked = study.machine(), study.asked()
+    scene = study.machine()
     _model(scene)
     if any("empirical(" in text or is_source(text) for text in study.vary):
         raise InputError(f"{document.name}: {KEY}: vary: a file of observations cannot be kept with a study")
-    parameters(asked["vary"], scene)
-    read_limits(asked["limits"], asked["requirements"], scene)
+    parameters(study.vary, scene)
+    read_limits(study.limit, study.require, scene)
 
 
 KINDS = {

@@ -5,30 +5,38 @@ A scene or problem is given as an object, as a mapping of its fields, by its nam
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, cast
 
-import numpy as np
-import numpy.typing as npt
-
-from shoal.arguments import check_apart, check_estimated, numbers, one_of, told
+from shoal.arguments import told
 from shoal.errors import InputError
+from shoal.requests.compare import Compare
+from shoal.requests.design import Design as DesignRequest
+from shoal.requests.export import Export
+from shoal.requests.fields import At, Data, OfScene
+from shoal.requests.function import function
+from shoal.requests.identify import Identify
+from shoal.requests.modes import Modes as ModesRequest
+from shoal.requests.reactions import Reactions as ReactionsRequest
+from shoal.requests.select import Select
+from shoal.requests.simulate import Simulate
+from shoal.requests.statics import Statics
+from shoal.requests.sweep import Sweep as SweepRequest
+from shoal.requests.uncertain import Uncertain
 from shoal.scene import Scene
 from shoal.scene.load import as_scene
 from shoal.trajectory import Trajectory
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from shoal.engines.compare import Comparison
+    from shoal.engines.contract import Engine
     from shoal.engines.prepared import Prepared
     from shoal.engines.sweep import Sweep
     from shoal.exported import Exported
-    from shoal.identification import Estimate, Problem
-    from shoal.identification.carried import Carried
+    from shoal.identification import Estimate
     from shoal.identification.design import Design
     from shoal.mechanics.analysis.campbell import Campbell
     from shoal.mechanics.analysis.equilibrium import Equilibrium
@@ -38,363 +46,359 @@ if TYPE_CHECKING:
     from shoal.response import Response
     from shoal.selection import Selection
 
-Stated: TypeAlias = Scene | Mapping[str, Any] | str | Path
-"""A scene, its fields as a mapping, the name of one, or a YAML file."""
-StatedProblem: TypeAlias = "Problem | Mapping[str, Any] | str | Path"
-"""A problem likewise."""
-Values: TypeAlias = "Mapping[str, Any] | Estimate | str | Path"
-"""Fields of a scene by dotted path, or what was found before: an estimate, or the JSON file of one."""
-Times = Sequence[float] | npt.NDArray[np.float64]
-Data: TypeAlias = "str | Path | pd.DataFrame | Mapping[str, str | Path | pd.DataFrame] | None"
+
+@function(Simulate)
+def simulate(asked: Simulate) -> Trajectory:
+    """Simulate a scene.
+
+    Returns:
+        The motion of the markers, with the estimated errors in `model["errors"]`; a rejected run has its reason in
+        `message`.
+
+    Raises:
+        InputError: A field is wrong; the message names it.
+
+    Examples:
+        >>> import shoal
+        >>> shoal.simulate("single-pendulum", [0.5, 1.0])
+        Trajectory(A; 2 samples, gauss, ok)
+    """
+    return motion(asked, machine(asked))[0]
 
 
-def simulate(
-    scene: Stated,
-    times: Times | None = None,
-    *,
-    values: Values | None = None,
-    engine: str = "gauss",
-    tolerance: float | None = None,
-    verify: bool = True,
-) -> Trajectory:
-    """Simulate a scene; its `status` says whether the motion can be trusted.
+def machine(asked: OfScene, note: Callable[[str], None] = lambda _: None) -> Scene:
+    """Return the scene of a request with its fields set; `note` is told of values that are doubted or left out.
 
-    times: sampling instants [s], else the scene's own; values: fields of the scene to set, by dotted path;
-    engine: gauss, exudyn, exudyn-ge, casadi, tree, mujoco or the address of a service; tolerance: error [m] that the
-    markers may have, for which the cheapest model is found (see `select`); verify: estimate the error by a second run,
-    which a tolerance cannot do without. Raises InputError.
+    Raises InputError.
+    """
+    if asked.values is None:
+        return asked.machine()
+    from shoal.identification.carried import carried
+
+    found = carried(asked.values)
+    for one in found.notes():
+        note(one)
+    return found.set_in(as_scene(asked.scene), asked.set)
+
+
+def motion(
+    asked: Simulate, scene: Scene, tell: Callable[[str], None] = lambda _: None
+) -> tuple[Trajectory, Scene, Selection | None]:
+    """Return the motion of a scene, the scene that was simulated, and how its model was chosen for a tolerance.
+
+    tell: called with what the search for a model does. Raises InputError.
     """
     from shoal.engines import get_engine
     from shoal.engines.verification import verified
 
-    check_estimated(tolerance, verify)
-    wanted = _scene(scene, values)
-    if tolerance is not None:
-        if engine != "gauss":
-            raise InputError(f"tolerance: models are chosen for engine gauss only, found engine {engine!r}")
-        return select(wanted, tolerance, times).trajectory
-    chosen = get_engine(engine)
-    return verified(chosen, wanted, times) if verify else chosen.simulate(wanted, times)
+    if asked.tolerance is not None:
+        from shoal.selection import select
+        from shoal.selection.refine import PATIENCE
+
+        patience = PATIENCE if asked.patience is None else asked.patience
+        selection = select(scene, asked.tolerance, asked.at, tell, patience)
+        return selection.trajectory, selection.chosen.scene, selection
+    engine = get_engine(asked.engine)
+    return (verified if asked.verify else _simulated)(engine, scene, asked.at), scene, None
 
 
-def prepare(scene: Stated, *, values: Values | None = None) -> Prepared:
-    """A scene for a loop of your own: call what comes back with values and times, as often as you like.
+def _simulated(engine: Engine, scene: Scene, times: At) -> Trajectory:
+    return engine.simulate(scene, times)
 
-    It gives what `simulate` gives without its second runs (`verify=False`), to the last bit, in a fraction of the time
-    around the steps. values: fields of the scene to set, by dotted path. Raises InputError.
+
+@function(OfScene)
+def prepare(asked: OfScene) -> Prepared:
+    """Prepare a scene.
+
+    Returns:
+        What is called with values of fields and times, as often as you like. It gives what `simulate` gives without
+        its second runs (`verify=False`), to the last bit, in a fraction of the time around the steps.
+
+    Raises:
+        InputError: A field is wrong; the message names it.
+
+    Examples:
+        >>> prepared = shoal.prepare("single-pendulum")
+        >>> prepared({"initial.OA.angle": 0.3}, [0.5]).ok
+        True
     """
     from shoal.engines.prepared import Prepared
 
-    return Prepared(_scene(scene, values).model_copy(deep=True))
+    return Prepared(machine(asked).model_copy(deep=True))
 
 
-def select(scene: Stated, tolerance: float, times: Times | None = None, *, values: Values | None = None) -> Selection:
-    """The cheapest model whose estimated error at the markers is below a tolerance [m]. Raises InputError."""
+@function(Select)
+def select(asked: Select) -> Selection:
+    """Find the cheapest model of a scene.
+
+    Returns:
+        The models that were tried with their estimated errors, the chosen one, and its motion.
+
+    Raises:
+        InputError: A field is wrong; the message names it.
+
+    Examples:
+        >>> shoal.select("flexible-double-pendulum", 1e-3).met
+        True
+    """
     from shoal.selection import select
 
-    return select(_scene(scene, values), tolerance, times)
+    return select(machine(asked), asked.tolerance, asked.at)
 
 
-def sweep(
-    scene: Stated,
-    vary: Mapping[str, Times],
-    time: float | None = None,
-    *,
-    values: Values | None = None,
-    engine: str = "gauss",
-    verify: bool = True,
-) -> Sweep:
-    """Marker positions at one instant [s] over the full grid of `vary` (path -> values). Raises InputError.
+@function(SweepRequest)
+def sweep(asked: SweepRequest) -> Sweep:
+    """Simulate a scene over a grid.
 
-    verify: whether errors are estimated at some of its points by more careful runs
+    Returns:
+        The positions of the markers over the grid, with errors that are estimated at some of its points.
+
+    Raises:
+        InputError: A field is wrong; the message names it.
+
+    Examples:
+        >>> found = shoal.sweep("single-pendulum", {"initial.OA.angle": [0.0, 0.5]}, at=0.5)
+        >>> found.positions["A"].shape
+        (2, 2)
     """
     from shoal.engines import get_engine
     from shoal.engines.spot_checks import spot_checked
     from shoal.engines.sweep import sweep
 
-    check_apart(values, vary)
-    found = sweep(_scene(scene, values), vary, get_engine(engine), time)
-    return spot_checked(found, get_engine(engine)) if verify else found
+    engine = get_engine(asked.engine)
+    found = sweep(machine(asked), asked.vary, engine, asked.at)
+    return spot_checked(found, engine) if asked.verify else found
 
 
-def uncertain(
-    scene: Stated,
-    vary: Mapping[str, Any] | Sequence[str],
-    times: Times | None = None,
-    *,
-    values: Values | None = None,
-    engine: str = "gauss",
-    method: str = "auto",
-    gap: float | None = None,
-    tolerance: float | None = None,
-    correlations: Mapping[tuple[str, str], float] | None = None,
-    degree: int | None = None,
-    count: int | None = None,
-    most: int = 20_000,
-    limits: Sequence[str] = (),
-    requirements: Sequence[str] = (),
-    limit_method: str = "auto",
-    limit_runs: int = 5_000,
-    allocate: bool = False,
-    costs: Mapping[str, float] | None = None,
-    target: float | None = None,
-    checkpoint: Path | str | None = None,
-    time_limit: float | None = None,
-    verify: bool = True,
-    seed: int = 0,
-    progress: Callable[[int], None] | None = None,
-) -> Response:
-    """Bound or predict the motion of the markers if fields of the scene are intervals or distributions.
+@function(Uncertain)
+def uncertain(asked: Uncertain) -> Response:
+    """Bound or predict the motion of a scene.
 
-    vary: path -> (low, high), a text such as "normal(1, 0.01)" or a frozen distribution of scipy, or a list of texts of
-    `--vary`; times: instants [s], else the scene's own; gap: between outer and attained bounds, as a share of the
-    largest width, that must be reached; tolerance: error [m] of the model; correlations: of pairs of random parameters;
-    degree, count: of a method that has one; most: runs that may be made; verify: estimate mesh and step errors of
-    extremal runs; limits: what must not happen, such as "B.y < -1.2"; requirements: what must hold, such as
-    "B.y > -1.2"; limit_method: auto, form, importance, subset or monte-carlo; limit_runs: for each of their
-    probabilities; allocate: look for the widest tolerances that keep the limit, with `costs` (by path, else 1) of
-    tightening each; target: probability of passing it that is allowed, else 0.001; checkpoint: file that keeps the
-    runs, from which the same study goes on; time_limit [s]: after which it ends with what is known; progress: called
-    with the number of runs. Raises InputError, ComputationError.
+    Returns:
+        Bounds of the markers' motion or its statistics, the verdicts on the limits, and the errors of all these.
+
+    Raises:
+        InputError: A field is wrong; the message names it.
+        ComputationError: Too many runs failed, or the time was over before the first.
+
+    Examples:
+        >>> found = shoal.uncertain("single-pendulum", {"initial.OA.angle": (0.1, 0.2)}, at=[0.5])
+        >>> found.status
+        'ok'
     """
     from shoal.response import uncertain
 
-    return uncertain(
-        _scene(scene, values),
-        vary,
-        times,
-        engine=engine,
-        method=method,
-        gap=gap,
-        tolerance=tolerance,
-        correlations=correlations,
-        degree=degree,
-        count=count,
-        most=most,
-        limits=limits,
-        requirements=requirements,
-        limit_method=limit_method,
-        limit_runs=limit_runs,
-        allocate=allocate,
-        costs=costs,
-        target=target,
-        checkpoint=checkpoint,
-        time_limit=time_limit,
-        verify=verify,
-        seed=seed,
-        progress=progress,
-    )
+    return uncertain(asked, machine(asked))
 
 
-def compare(
-    scene: Stated,
-    engines: Sequence[str] | None = None,
-    times: Times | None = None,
-    *,
-    values: Values | None = None,
-    verify: bool = True,
-) -> Comparison:
-    """Run a scene on several engines; `differences()` returns the distances of their results.
+@function(Compare)
+def compare(asked: Compare) -> Comparison:
+    """Run a scene on several engines.
 
-    engines: by name; else our solver and at most two that can run the scene; verify: estimate the errors that they may
-    share, of the mesh and of the theory, by more careful runs of one. Raises InputError.
+    Returns:
+        The motions by engine; `differences()` returns how far apart they are.
+
+    Raises:
+        InputError: A field is wrong; the message names it.
+
+    Examples:
+        >>> list(shoal.compare("single-pendulum", ["gauss", "casadi"], at=[0.5]).trajectories)
+        ['gauss', 'casadi']
     """
     from shoal.engines.compare import compare
 
-    return compare(_scene(scene, values), engines, times, verify)
+    return compare(machine(asked), asked.engines, asked.at, asked.verify)
 
 
-def statics(
-    scene: Stated,
-    time: float = 0.0,
-    *,
-    values: Values | None = None,
-    verify: bool = True,
-    tolerance: float | None = None,
-) -> Equilibrium:
-    """Where a scene comes to rest, and whether it is stable there. Raises InputError.
+@function(Statics)
+def statics(asked: Statics) -> Equilibrium:
+    """Find the static equilibrium of a scene.
 
-    time: what is applied stands as it is then [s]; values: fields of the scene to set, by dotted path; verify: estimate
-    the error of the mesh by a second run on twice as many elements, which a tolerance cannot do without; tolerance:
-    double the elements of the rods until the error at the markers is below [m]
+    Returns:
+        The positions of the markers at rest, whether they are stable, and their estimated error.
+
+    Raises:
+        InputError: A field is wrong; the message names it.
+
+    Examples:
+        >>> shoal.statics("single-pendulum").ok
+        True
     """
     from shoal.mechanics.analysis.mesh_error import of_equilibrium
     from shoal.mechanics.analysis.settled import settled
     from shoal.mechanics.analysis.statics import statics
 
-    check_estimated(tolerance, verify)
-    wanted = _scene(scene, values)
-    if tolerance is not None:
-        return settled(wanted, tolerance, time)
-    found = statics(wanted, time)
-    return of_equilibrium(found, wanted) if verify else found
+    scene = machine(asked)
+    if asked.tolerance is not None:
+        return settled(scene, asked.tolerance, asked.time)
+    found = statics(scene, asked.time)
+    return of_equilibrium(found, scene) if asked.verify else found
 
 
-def modes(
-    scene: Stated,
-    *,
-    count: int = 10,
-    about: Literal["equilibrium", "start"] = "equilibrium",
-    speeds: Times | None = None,
-    values: Values | None = None,
-    verify: bool = True,
-) -> Modes | Campbell:
-    """The `count` lowest eigenfrequencies of a scene with their shapes, about its equilibrium or its start.
+@function(ModesRequest)
+def modes(asked: ModesRequest) -> Modes | Campbell:
+    """Find the modes of a scene.
 
-    Where the start moves they are those about its steady motion. speeds: of the body that turns fastest [rad/s], for a
-    Campbell diagram; at 0 the machine is at rest. values: fields of the scene to set, by dotted path; verify: estimate
-    the error of the mesh by a second run on twice as many elements. Raises InputError.
+    Returns:
+        Frequencies, damping and shapes with their estimated errors; with `speeds` a Campbell diagram.
+
+    Raises:
+        InputError: A field is wrong; the message names it.
+
+    Examples:
+        >>> len(shoal.modes("single-pendulum", count=1).frequencies)
+        1
     """
     from shoal.mechanics.analysis.campbell import campbell
     from shoal.mechanics.analysis.mesh_error import of_campbell, of_modes
     from shoal.mechanics.analysis.modes import modes
 
-    wanted = _scene(scene, values)
-    if speeds is not None:
-        diagram = campbell(wanted, list(speeds), about=about, count=count)
-        return of_campbell(diagram, wanted) if verify else diagram
-    found = modes(wanted, about=about, count=count)
-    return of_modes(found, wanted) if verify else found
+    scene = machine(asked)
+    if asked.speeds is not None:
+        diagram = campbell(scene, list(asked.speeds), about=asked.about, count=asked.count)
+        return of_campbell(diagram, scene) if asked.verify else diagram
+    found = modes(scene, about=asked.about, count=asked.count)
+    return of_modes(found, scene) if asked.verify else found
 
 
-def export(
-    scene: Stated,
-    to: Literal["exudyn", "mjcf"],
-    file: str | Path | None = None,
-    *,
-    values: Values | None = None,
-    verify: bool = True,
-) -> Exported:
-    """A scene for another tool: a script for Exudyn that runs by itself, or MuJoCo's MJCF.
+@function(Export)
+def export(asked: Export) -> Exported:
+    """Write a scene as a file of another tool.
 
-    file: written where it is given, .py or .xml; values: fields of the scene to set, by dotted path; verify: run it
-    there and here, and tell how far apart the motions are [m]. Raises InputError that names what the tool has not,
-    ComputationError where a run fails.
+    Returns:
+        The text of the file, its name, and the distance [m] between the motions where they were compared.
+
+    Raises:
+        InputError: A field is wrong, or the other tool lacks something of the scene; the message names it.
+        ComputationError: A run to compare with failed.
+
+    Examples:
+        >>> shoal.export("single-pendulum", "exudyn", verify=False).name
+        'single-pendulum.py'
     """
     from shoal.exported import checked, export
 
-    path = None if file is None else Path(file)
-    found = export(_scene(scene, values), checked(to, path), verify=verify)
+    path = None if asked.file is None else Path(asked.file)
+    found = export(machine(asked), checked(asked.to, path), verify=asked.verify)
     if path is not None:
         found.save(path)
     return found
 
 
-def reactions(scene: Stated, times: Times, *, values: Values | None = None, verify: bool = True) -> list[Reactions]:
-    """Forces and torques in the joints of a scene at times [s] of its motion. Raises InputError, ComputationError.
+@function(ReactionsRequest)
+def reactions(asked: ReactionsRequest) -> list[Reactions]:
+    """Find the forces in the joints of a scene.
 
-    values: fields of the scene to set, by dotted path; verify: estimate their errors by runs with other steps
+    Returns:
+        One entry for each instant, with forces [N] and torques [N m] by joint as they act on the second body.
+
+    Raises:
+        InputError: A field is wrong; the message names it.
+        ComputationError: The motion failed before the last of the instants.
+
+    Examples:
+        >>> len(shoal.reactions("single-pendulum", [0.1, 0.2]))
+        2
     """
     from shoal.mechanics.analysis.reactions import reactions
     from shoal.mechanics.analysis.reactions_verified import verified
 
-    return (verified if verify else reactions)(_scene(scene, values), numbers("times", times, "times in s").tolist())
+    return (verified if asked.verify else reactions)(machine(asked), list(asked.at))
 
 
-def identify(
-    problem: StatedProblem,
-    data: Data = None,
-    *,
-    method: str | None = None,
-    values: Values | None = None,
-    seed: int = 0,
-    engine: str = "gauss",
-    tolerance: float | None = None,
-    time_limit: float | None = None,
-    profiles: bool = False,
-    bootstrap: int = 0,
-    sample: int = 0,
-    **options: Any,
-) -> Estimate:
-    """Find the parameters of a problem from measured motion.
+@function(Identify)
+def identify(asked: Identify) -> Estimate:
+    """Find the parameters of a problem.
 
-    data: a file, or a table whose columns are those that the problem's channels name, instead of the problem's own
-    recording; for several recordings a mapping from their names to these; method: one of `METHODS`, else the problem's;
-    values: fields of the scene to set, or an estimate or its JSON file: what is sought starts from there, what else it
-    found is set; tolerance: error [m] that the model may have, for which it is chosen;
-    time_limit: of all of it [s]; profiles: the profile likelihood of every parameter; bootstrap: how many draws;
-    sample: how many effective draws from the posterior;
-    options: further ones of `shoal.identification.identify` (hold_out, progress, measurement, checkpoint, wishes).
-    Raises InputError, ComputationError.
+    Returns:
+        The parameters with their standard deviations, intervals and whether they are identifiable, the verdict on
+        them, and the residuals.
+
+    Raises:
+        InputError: A field is wrong; the message names it.
+        ComputationError: Nothing could be fitted.
+
+    Examples:
+        >>> shoal.identify("paper-case-1", method="least-squares").verdict.trusted
+        True
     """
     from shoal.identification import Estimate, identify
+    from shoal.identification.carried import carried
     from shoal.identification.conclude import Wishes
+    from shoal.identification.problem import as_problem
 
     shown(Estimate)
-    options = {"wishes": Wishes(profiles=profiles, bootstrap=bootstrap, sample=sample), **options}
-    stated, carried = _values(values)
-    if carried is not None:
-        options["fitted"] = carried
-    options |= {"method": method, "values": stated, "seed": seed, "engine": engine, "tolerance": tolerance}
-    with _files(data) as files:
-        return identify(_problem(problem), data=files, time_limit=time_limit, **options)
+    same = ("method", "engine", "hold_out", "seed", "tolerance", "time_limit")
+    with _files(asked.data) as files:
+        return identify(
+            as_problem(cast(Any, asked.problem)),
+            data=files,
+            values=asked.set,
+            fitted=None if asked.values is None else carried(asked.values),
+            checkpoint=None if asked.checkpoint is None else Path(asked.checkpoint),
+            wishes=Wishes(asked.profiles, asked.bootstrap, asked.sample),
+            progress=asked.progress or (lambda *_: None),
+            **{name: getattr(asked, name) for name in same},
+        )
 
 
-def design(
-    problem: StatedProblem,
-    data: Data = None,
-    *,
-    about: Literal["answer", "start"] | None = None,
-    values: Values | None = None,
-    noise: float | None = None,
-    angle_noise: float | None = None,
-    sensor_noise: Mapping[str, float] | None = None,
-    duration: float | None = None,
-    rate: float | None = None,
-    parameter: str | None = None,
-) -> Design:
-    """What to measure to know the parameters of a problem best: which sensor where, how long and how often.
+@function(DesignRequest)
+def design(asked: DesignRequest) -> Design:
+    """Design an experiment.
 
-    data: as for `identify`; about: the answer from the data, where there are any, or the start; noise [m], angle_noise
-    [rad]: standard deviations, sensor_noise: of acceleration, rate, force, torque and strain, by name, in SI units,
-    which are weighed where it is known; duration [s] and rate [1/s] of the measurement, else those of the problem and
-    its data; parameter: to be sharpened, else the weakest. Raises InputError, ComputationError where no answer can be
-    trusted.
+    Returns:
+        Measurements ranked by how much better they let the parameter be known.
+
+    Raises:
+        InputError: A field is wrong; the message names it.
+        ComputationError: No answer can be trusted.
+
+    Examples:
+        >>> shoal.design("paper-case-1", about="start", noise=1e-3).ok
+        True
     """
-    from shoal.identification.design import ABOUT, about_answer, about_start, has_data
+    return designed(asked)
 
-    if about is not None:
-        one_of("about", about, ABOUT)
-    (stated, carried), wanted = _values(values), _problem(problem)
-    if carried is not None:
-        wanted, stated, _ = carried.into(wanted)
-    how = dict[str, Any](noise=noise, angle_noise=angle_noise, sensor_noise=sensor_noise, duration=duration, rate=rate)
-    answered = about == "answer" or (about is None and (data is not None or has_data(wanted)))
-    with _files(data) as files:
-        return (about_answer if answered else about_start)(wanted, files, stated, parameter=parameter, **how)
+
+def designed(asked: DesignRequest, note: Callable[[str], None] = lambda _: None) -> Design:
+    """Return the design of an experiment; `note` is told of values that are doubted or left out.
+
+    Raises InputError, ComputationError.
+    """
+    from shoal.identification.carried import carried
+    from shoal.identification.design import about_answer, about_start, has_data
+    from shoal.identification.problem import as_problem
+
+    problem, stated = as_problem(cast(Any, asked.problem)), asked.set
+    if asked.values is not None:
+        problem, stated, notes = carried(asked.values).into(problem, stated)
+        for one in notes:
+            note(one)
+    same = ("noise", "angle_noise", "sensor_noise", "duration", "rate", "parameter")
+    answered = asked.about == "answer" or (asked.about is None and (asked.data is not None or has_data(problem)))
+    with _files(asked.data) as files:
+        how = {name: getattr(asked, name) for name in same}
+        return (about_answer if answered else about_start)(problem, files, stated, **how)
 
 
 def plot(result: Scene | Trajectory | Equilibrium | Estimate | Sweep | Comparison) -> Picture:
-    """The picture of a scene (its motion), a trajectory, a place of rest, an estimate, a sweep or a comparison.
+    """Draw a result.
 
-    Raises InputError.
+    Args:
+        result: A scene (its motion), a trajectory, an equilibrium, an estimate, a sweep or a comparison.
+
+    Returns:
+        The picture, which a notebook shows; `save` writes it.
+
+    Raises:
+        InputError: There is no picture of such an object.
+
+    Examples:
+        >>> shoal.plot(shoal.simulate("single-pendulum")).save("motion.png")
     """
     from shoal.pictures.inline import plot
 
     return plot(result)
-
-
-def _scene(given: Stated, values: Values | None) -> Scene:
-    scene = as_scene(given)
-    stated, carried = _values(values)
-    if carried is not None:
-        return carried.set_in(scene)
-    return scene.with_values(stated) if stated else scene
-
-
-def _values(given: Values | None) -> tuple[Mapping[str, Any] | None, Carried | None]:
-    """Fields to set as they are stated, or what was found before."""
-    if given is None or isinstance(given, Mapping):
-        return given, None
-    from shoal.identification.carried import carried
-
-    return None, carried(given)
-
-
-def _problem(given: StatedProblem) -> Problem:
-    from shoal.identification.problem import as_problem
-
-    return as_problem(given)
 
 
 @contextmanager

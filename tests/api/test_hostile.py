@@ -30,17 +30,17 @@ def refused(client: httpx.Client, path: str, **request: Any) -> tuple[int, str, 
     [
         (b"[" * 100_000 + b"]" * 100_000, "malformed"),
         (b'{"scene": ' + b"[" * 40 + b"]" * 40 + b"}", "malformed"),
-        (b'{"scene": "single-pendulum", "times": [NaN]}', "malformed"),
-        (b'{"scene": "single-pendulum", "times": [1e999]}', "malformed"),
-        (b'{"scene": "single-pendulum", "times": [-Infinity]}', "malformed"),
-        (b'{"scene": "single-pendulum", "values": {"solver.step": 0.1, "solver.step": 0.001}}', "malformed"),
+        (b'{"scene": "single-pendulum", "at": [NaN]}', "malformed"),
+        (b'{"scene": "single-pendulum", "at": [1e999]}', "malformed"),
+        (b'{"scene": "single-pendulum", "at": [-Infinity]}', "malformed"),
+        (b'{"scene": "single-pendulum", "set": {"solver.step": 0.1, "solver.step": 0.001}}', "malformed"),
         (b"\xff\xfe", "malformed"),
         (b"", "input"),
         (b"null", "input"),
         (b'{"scene": "single-pendulum", "surprise": 1}', "input"),
         (b'{"scene": "\\u0000"}', "input"),
-        (b'{"scene": "single-pendulum", "times": [true]}', "input"),
-        (b'{"scene": "single-pendulum", "values": {"gravity": [0, true]}}', "input"),
+        (b'{"scene": "single-pendulum", "at": [true]}', "input"),
+        (b'{"scene": "single-pendulum", "set": {"gravity": [0, true]}}', "input"),
     ],
 )
 def test_body(gauss: httpx.Client, body: bytes, kind: str) -> None:
@@ -83,17 +83,17 @@ def test_names_are_no_paths(gauss: httpx.Client, name: str) -> None:
 @pytest.mark.parametrize(
     "changes",
     [
-        {"lanes": {"initial.OA.angle": [0.0] * 200_000}, "times": [100.0]},
+        {"lanes": {"initial.OA.angle": [0.0] * 200_000}, "at": [100.0]},
         {"lanes": {"solver.step": [1e-3, 1e-12]}},
-        {"values": {"solver.samples": 10_000_000}, "times": None},
-        {"values": {"solver.step": 1e-12}},
-        {"values": {"solver.acceleration": "afsa", "solver.swarm_iterations": 1_000_000}},
-        {"scene": "n-four-bar-40", "times": [36000.0]},
-        {"scene": "flexible-double-pendulum", "values": {"bodies.OA.elements": 10_000}},
+        {"set": {"solver.samples": 10_000_000}, "at": None},
+        {"set": {"solver.step": 1e-12}},
+        {"set": {"solver.acceleration": "afsa", "solver.swarm_iterations": 1_000_000}},
+        {"scene": "n-four-bar-40", "at": [36000.0]},
+        {"scene": "flexible-double-pendulum", "set": {"bodies.OA.elements": 10_000}},
     ],
 )
 def test_too_much_work(gauss: httpx.Client, machine: Machine, changes: dict[str, Any]) -> None:
-    request = {"scene": machine, "times": [0.5], **changes}
+    request = {"scene": machine, "at": [0.5], **changes}
     assert refused(gauss, "/v1/simulate", json=request)[:2] == (422, "too-much")
 
 
@@ -110,7 +110,7 @@ def test_too_much_work(gauss: httpx.Client, machine: Machine, changes: dict[str,
 def test_expressions(gauss: httpx.Client, machine: Machine, text: str) -> None:
     """A tower of powers is a float without a value; what is not arithmetic is refused."""
     machine = machine | {"loads": {"m": {"kind": "torque", "body": "OA", "torque": text}}}
-    assert refused(gauss, "/v1/simulate", json={"scene": machine, "times": [0.1]})[:2] == (422, "input")
+    assert refused(gauss, "/v1/simulate", json={"scene": machine, "at": [0.1]})[:2] == (422, "input")
 
 
 @pytest.mark.parametrize(
@@ -126,7 +126,7 @@ def test_expressions(gauss: httpx.Client, machine: Machine, text: str) -> None:
         ({"scene": ["single-pendulum"]}, "scene"),
         ({"ties": {"bodies.OA.mass": "theta.__class__"}}, "ties"),
         ({"ties": {"bodies.OA.mass": "theta" + "*1" * 400}}, "longer than"),
-        ({"values": {"bodies.OA.mass": "/etc/passwd"}}, "mass"),
+        ({"set": {"bodies.OA.mass": "/etc/passwd"}}, "mass"),
         ({"method": "../x"}, "no method"),
         ({}, "'recording' is missing"),
     ],
@@ -140,7 +140,7 @@ def test_problems_open_nothing(gauss: httpx.Client, problem: Machine, changes: d
 
 @pytest.mark.parametrize("name", ["../a", "/tmp/a", "a/b", ""])
 def test_names_of_recordings(gauss: httpx.Client, problem: Machine, name: str) -> None:
-    request = {"problem": problem, "recordings": {name: {"columns": {"t": [0.0]}}}}
+    request = {"problem": problem, "data": {name: {"columns": {"t": [0.0]}}}}
     assert refused(gauss, "/v1/identifications", json=request)[0] == 422
 
 

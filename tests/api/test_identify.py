@@ -31,7 +31,7 @@ def body(machine: Machine, problem: Machine, name: str, columns: dict[str, list[
     """A request whose scene has a name that the obedient engine obeys."""
     return {
         "problem": {**problem, "scene": machine | {"name": name}},
-        "recordings": {"recording": {"columns": columns}},
+        "data": {"recording": {"columns": columns}},
     }
 
 

@@ -45,8 +45,7 @@ def test_an_entry_is_put_listed_simulated_given_and_forgotten(service: httpx.Cli
     assert put.json() in listed["entries"]
     assert "single-pendulum" in listed["scenes"]
     by_name, inline = (
-        service.post("/v1/simulate", json={"scene": scene, "times": [0.1]}).json()["points"]
-        for scene in ("arm", machine)
+        service.post("/v1/simulate", json={"scene": scene, "at": [0.1]}).json()["points"] for scene in ("arm", machine)
     )
     assert by_name == inline
     lighter = {**machine, "gravity": [0.0, -1.62]}
@@ -55,7 +54,7 @@ def test_an_entry_is_put_listed_simulated_given_and_forgotten(service: httpx.Cli
     assert found["versions"][0] == put.json()["version"] != found["version"]
     assert yaml.safe_load(base64.b64decode(found["files"]["arm.yaml"])) == lighter
     versions = [f"arm@{version}" for version in found["versions"]]
-    old, new = (service.post("/v1/simulate", json={"scene": one, "times": [0.1]}).json()["points"] for one in versions)
+    old, new = (service.post("/v1/simulate", json={"scene": one, "at": [0.1]}).json()["points"] for one in versions)
     assert old == by_name != new
     assert service.delete("/v1/library/scenes/arm").status_code == 204
     assert refused(service.get("/v1/library/scenes/arm"))[0] == 404
@@ -70,7 +69,7 @@ def test_a_problem_and_a_recording_are_taken_by_name(service: httpx.Client, prob
     assert run.status_code == 200, run.text
     put = service.put("/v1/library/problems/start", json=files(start_yaml=yaml.safe_dump(stated)))
     assert put.status_code == 200, put.text
-    asked = [{"problem": "start"}, {"problem": {**problem, "scene": "arm"}, "recordings": {"recording": "run"}}]
+    asked = [{"problem": "start"}, {"problem": {**problem, "scene": "arm"}, "data": {"recording": "run"}}]
     found = []
     for request in asked:
         made = service.post("/v1/identifications", json=request)
@@ -80,8 +79,8 @@ def test_a_problem_and_a_recording_are_taken_by_name(service: httpx.Client, prob
         result = service.get(f"{place}/result").json()
         found.append((result["parameters"]["theta"]["value"], result["data"]))
     assert found[0] == found[1]
-    answer = service.post("/v1/identifications", json={**asked[1], "recordings": {"recording": "ruin"}})
-    assert refused(answer) == (422, "recordings.recording: ruin: no such recording of the library (did you mean run?)")
+    answer = service.post("/v1/identifications", json={**asked[1], "data": {"recording": "ruin"}})
+    assert refused(answer) == (422, "data.recording: ruin: no such recording of the library (did you mean run?)")
 
 
 @pytest.mark.parametrize(

@@ -24,7 +24,6 @@ from shoal.api.tasks import told
 from shoal.client import Client
 from shoal.engines.sweep import Sweep
 from shoal.errors import ComputationError, InputError
-from shoal.identification import identify
 from shoal.scene import Scene
 from shoal.trajectory import json_text, plain
 
@@ -32,14 +31,14 @@ JSON = {"Content-Type": "application/json"}
 SCENE = "rigid-double-pendulum"
 ANGLES = np.linspace(0.1, 0.5, 3)
 CALLS: dict[str, tuple[tuple[Any, ...], dict[str, Any]]] = {
-    "simulate": ((SCENE, [0.1, 0.2]), {"values": {"initial.OA.angle": 0.3}}),
-    "select": (("flexible-double-pendulum", 1e-3), {"times": [0.1], "values": {"solver.duration": 0.1}}),
-    "sweep": ((SCENE, {"initial.OA.angle": ANGLES}), {"time": 0.2}),
-    "uncertain": ((SCENE, {"initial.OA.angle": (0.3, 0.4)}, [0.1, 0.2]), {"most": 200, "seed": 3, "limits": ["B.y>0"]}),
-    "statics": (("flexible-double-pendulum",), {"values": {"gravity": [0.5, -1.62]}}),
+    "simulate": ((SCENE, [0.1, 0.2]), {"set": {"initial.OA.angle": 0.3}}),
+    "select": (("flexible-double-pendulum", 1e-3), {"at": [0.1], "set": {"solver.duration": 0.1}}),
+    "sweep": ((SCENE, {"initial.OA.angle": ANGLES}), {"at": 0.2}),
+    "uncertain": ((SCENE, {"initial.OA.angle": (0.3, 0.4)}, [0.1, 0.2]), {"runs": 200, "seed": 3, "limit": ["B.y>0"]}),
+    "statics": (("flexible-double-pendulum",), {"set": {"gravity": [0.5, -1.62]}}),
     "modes": (("flexible-double-pendulum",), {"count": 3, "about": "equilibrium"}),
     "reactions": ((SCENE, np.array([0.0, 0.1])), {}),
-    "export": (("single-pendulum", "exudyn"), {"values": {"solver.duration": 0.1}}),
+    "export": (("single-pendulum", "exudyn"), {"set": {"solver.duration": 0.1}}),
     "identify": (("paper-case-1",), {"method": "least-squares", "seed": 1}),
     "design": (("paper-case-1",), {"about": "start", "noise": 1e-3}),
 }
@@ -109,15 +108,6 @@ def test_every_operation_is_a_method_with_the_signature_of_its_function() -> Non
         assert getattr(Client, name).__doc__ == getattr(shoal, name).__doc__
 
 
-def test_every_field_of_a_request_is_an_argument_of_its_function() -> None:
-    """But for recordings, which are data, lanes, which engines know, and how it is answered."""
-    for name, request in OPERATIONS.items():
-        stated = set(request.model_fields) - {"recordings", "lanes", "objects"}
-        known = {*signature(getattr(shoal, name)).parameters}
-        known |= {*signature(identify).parameters} if name == "identify" else set()
-        assert stated <= known, name
-
-
 @pytest.mark.parametrize("name", CALLS)
 def test_the_answer_is_the_librarys(client: Client, name: str) -> None:
     arguments, options = CALLS[name]
@@ -138,12 +128,12 @@ def test_without_the_client_it_is_what_the_command_prints(gauss: httpx.Client, n
 
 
 def test_what_is_uncertain_is_said_in_every_way_of_the_library(client: Client) -> None:
-    paths, few = ["initial.OA.angle", "initial.AB.angle"], {"most": 60, "verify": False, "times": [0.1]}
+    paths, few = ["initial.OA.angle", "initial.AB.angle"], {"runs": 60, "verify": False, "at": [0.1]}
     normal = dict.fromkeys(paths, "normal(0.3,0.01)")
     for vary, more in [
         (["initial.OA.angle=0.3:0.4"], {}),
         ({"bodies.OA.length": ("-2%", "2%")}, {}),
-        (normal, {"correlations": {(paths[0], paths[1]): 0.5}}),
+        (normal, {"correlate": {(paths[0], paths[1]): 0.5}}),
     ]:
         far, near = (place.uncertain(SCENE, vary, **few, **more) for place in (client, shoal))
         assert not list(differ(near, far))
@@ -227,18 +217,18 @@ def test_a_callers_own_scene_problem_and_recording(client: Client, problem: dict
         ("uncertain", {"vary": {"gravity.1": "empirical(f.csv)"}}, "vary.gravity.1: 'empirical(f.csv)' is no dist"),
         (
             "sweep",
-            {"vary": {"initial.OA.angle": [0.1]}, "values": {"initial.OA.angle": 0.3}},
+            {"vary": {"initial.OA.angle": [0.1]}, "set": {"initial.OA.angle": 0.3}},
             "is set to 0.3 and varied",
         ),
-        ("simulate", {"lanes": {"initial.OA.angle": [0.1]}, "values": {"initial.OA.angle": 0.3}}, "is set to 0.3"),
+        ("simulate", {"lanes": {"initial.OA.angle": [0.1]}, "set": {"initial.OA.angle": 0.3}}, "is set to 0.3"),
         ("sweep", {"vary": {"initial.OA.angle": []}}, "vary.initial.OA.angle: "),
         ("sweep", {"vary": {f"initial.OA.angle{k}": [0.0] * 1000 for k in range(9)}}, "times: "),
         ("sweep", {"vary": {"solver.step": [1e-3, 1e-12]}}, "solver.step: "),
         ("statics", {"time": -1}, "time: "),
         ("modes", {"count": 0}, "count: "),
         ("modes", {"about": "noon"}, "about: "),
-        ("reactions", {"times": []}, "times: "),
-        ("reactions", {}, "times: "),
+        ("reactions", {"at": []}, "at: "),
+        ("reactions", {}, "at: "),
         ("select", {"tolerance": 0}, "tolerance: "),
         ("select", {"tolerance": 1, "engine": "exudyn"}, "engine: "),
     ],
@@ -260,7 +250,7 @@ def test_wrong_calls_are_refused(client: Client) -> None:
     assert client.simulate(SCENE, [0.1], engine="gauss").ok
     with pytest.raises(InputError, match="no such scene"):
         client.simulate("single-pendolum")
-    with pytest.raises(InputError, match="measurement: "):
+    with pytest.raises(TypeError, match="measurement"):
         client.identify("paper-case-1", measurement=1)
     with pytest.raises(TypeError, match="colour"):
         client.simulate(SCENE, colour="red")
@@ -269,7 +259,7 @@ def test_wrong_calls_are_refused(client: Client) -> None:
 def test_lanes_are_looked_at(gauss: httpx.Client) -> None:
     """A few of them, as of a sweep: the largest of the errors."""
     lanes = {"initial.OA.angle": ANGLES.tolist()}
-    body = {"scene": SCENE, "times": [0.2], "lanes": lanes}
+    body = {"scene": SCENE, "at": [0.2], "lanes": lanes}
     found, bare = (gauss.post("/v1/simulate", json={**body, **more}).json() for more in ({}, {"verify": False}))
     assert found["points"] == bare["points"]
     checked = found["model"]["verification"]
@@ -279,7 +269,7 @@ def test_lanes_are_looked_at(gauss: httpx.Client) -> None:
 
 
 def test_a_tolerance_chooses_the_model(gauss: httpx.Client) -> None:
-    body = {"scene": "flexible-double-pendulum", "times": [0.1], "tolerance": 1e-3}
+    body = {"scene": "flexible-double-pendulum", "at": [0.1], "tolerance": 1e-3}
     found = gauss.post("/v1/simulate", json=body).json()
     assert found["status"] == ["ok"]
     assert found["selection"]["estimated_error"] <= 1e-3

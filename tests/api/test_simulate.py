@@ -20,14 +20,14 @@ Machine = dict[str, Any]
 
 
 def post(client: httpx.Client, machine: Machine, **changes: Any) -> httpx.Response:
-    return client.post("/v1/simulate", json={"scene": machine, "times": [0.1], **changes})
+    return client.post("/v1/simulate", json={"scene": machine, "at": [0.1], **changes})
 
 
 def test_lanes_are_the_engines_own(gauss: httpx.Client) -> None:
     """Every bit of every lane survives the way."""
     angles = [0.3, 0.4, 0.1 + 0.2]
     answer = gauss.post(
-        "/v1/simulate", json={"scene": "single-pendulum", "times": [0.1, 0.2], "lanes": {"initial.OA.angle": angles}}
+        "/v1/simulate", json={"scene": "single-pendulum", "at": [0.1, 0.2], "lanes": {"initial.OA.angle": angles}}
     )
     local = get_engine("gauss").simulate_many(
         load_scene("single-pendulum"), {"initial.OA.angle": np.array(angles)}, [0.1, 0.2]

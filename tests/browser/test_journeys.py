@@ -169,7 +169,7 @@ def test_a_flow_that_fails_or_is_not_to_be_trusted_says_why(desk: Any, visit: Ca
     from playwright.sync_api import expect
 
     one = visit()
-    wrong = {"problem": "paper-case-1", "methods": ["least-squares"], "values": {"solver.step": 0.01}}
+    wrong = {"problem": "paper-case-1", "methods": ["least-squares"], "set": {"solver.step": 0.01}}
     run = run_deployment(desk.at["PREFECT"], "identify/identify", wrong)
     one.page.goto(f"{desk.at['PREFECT']}/runs/flow-run/{run['id']}")
     expect(one.page.get_by_text("Failed", exact=True).first).to_be_visible()

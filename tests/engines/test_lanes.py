@@ -66,7 +66,7 @@ def test_lanes_in_space_are_runs_of_their_own(path: str, values: list[float]) ->
     assert found.ok
     assert np.ptp(found.positions["load"], axis=0).max() > 1e-9
     for lane, value in enumerate(values):
-        alone = shoal.simulate(scene, times=[0.1], values={path: value}, verify=False)
+        alone = shoal.simulate(scene, at=[0.1], set={path: value}, verify=False)
         assert found.positions["load"][lane] == pytest.approx(alone.points[-1, 1, :, 0], abs=1e-12)
 
 
@@ -147,7 +147,7 @@ def test_lanes_of_given_modes_are_runs_of_their_own(path: str) -> None:
     found = shoal.sweep(scene, {path: values}, verify=False)
     assert found.ok
     for lane, value in enumerate(values):
-        alone = shoal.simulate(scene, times=[0.02], values={path: float(value)}, verify=False)
+        alone = shoal.simulate(scene, at=[0.02], set={path: float(value)}, verify=False)
         for number, name in enumerate(scene.markers):
             assert found.positions[name][lane] == pytest.approx(alone.points[-1, number, :, 0], abs=1e-9)
 

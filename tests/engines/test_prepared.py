@@ -75,7 +75,7 @@ def test_every_integrator_starts_afresh(integrator: str) -> None:
 )
 def test_values_are_those_of_the_scene(values: dict[str, Any]) -> None:
     times = np.array([0.01, 0.02])
-    assert_same(repeated(RIGID, values=values, times=times), shoal.simulate(RIGID, times, values=values, verify=False))
+    assert_same(repeated(RIGID, values=values, times=times), shoal.simulate(RIGID, times, set=values, verify=False))
 
 
 @pytest.mark.parametrize(
@@ -87,7 +87,7 @@ def test_lanes_are_those_of_the_engine(path: str, value: float) -> None:
     found = repeated(FLEXIBLE, values={path: lanes, "bodies.OA.density": 5000.0}, times=times)
     lighter = FLEXIBLE.with_values({"bodies.OA.density": 5000.0})
     assert_same(found, get_engine("gauss").simulate_many(lighter, {path: lanes}, times))
-    alone = shoal.simulate(lighter, times, values={path: float(lanes[11])}, verify=False)
+    alone = shoal.simulate(lighter, times, set={path: float(lanes[11])}, verify=False)
     np.testing.assert_allclose(found.points[..., 11], alone.points[..., 0], rtol=0, atol=1e-11)
 
 

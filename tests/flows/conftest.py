@@ -7,6 +7,8 @@ import pytest
 from shoal.engines.compare import Comparison
 from shoal.engines.sweep import Sweep
 from shoal.identification import Measurement
+from shoal.notebook import compare
+from shoal.requests.sweep import Sweep as SweepRequest
 from shoal_flows import jobs
 from shoal_flows.jobs import Cell, Fit
 
@@ -26,9 +28,9 @@ def fits(measurement: Measurement) -> list[Fit]:
 
 @pytest.fixture(scope="session")
 def comparison() -> Comparison:
-    return jobs.compared(SCENE, ["gauss", "exudyn", "casadi"], {})
+    return compare(SCENE, ["gauss", "exudyn", "casadi"])
 
 
 @pytest.fixture(scope="session")
 def sweep() -> Sweep:
-    return jobs.swept(SCENE, {"initial.OA.angle": np.linspace(0.0, 1.0, 5)}, "gauss", None)
+    return jobs.swept(SweepRequest(SCENE, {"initial.OA.angle": np.linspace(0.0, 1.0, 5)}))

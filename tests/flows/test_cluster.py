@@ -18,6 +18,7 @@ import pytest
 from deployed import free_port, of_home
 from shoal.engines.pieces import joined, pieces
 from shoal.errors import ComputationError, InputError
+from shoal.requests.sweep import Sweep
 from shoal_flows import cluster, jobs, workers
 
 SCENE = "flexible-double-pendulum"
@@ -38,12 +39,12 @@ def test_a_killed_worker_loses_nothing(asked: pytest.MonkeyPatch) -> None:
     client.wait_for_workers(2)
     assert workers.count() == 2
     grids = pieces(VARY, 4)
-    pending = [workers.submit(jobs.swept, SCENE, grid, "gauss", 0.2) for grid in grids]
+    pending = [workers.submit(jobs.swept, Sweep(SCENE, grid, 0.2)) for grid in grids]
     victim = next(iter(client.run(os.getpid).values()))
     time.sleep(0.5)
     os.kill(victim, signal.SIGKILL)
     found = joined([part.result() for part in pending])
-    here = joined([jobs.swept(SCENE, grid, "gauss", 0.2) for grid in grids])
+    here = joined([jobs.swept(Sweep(SCENE, grid, 0.2)) for grid in grids])
     assert found.ok
     assert np.array_equal(found.displacements["B"], here.displacements["B"])
     assert victim not in client.run(os.getpid).values()

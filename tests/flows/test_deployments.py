@@ -63,10 +63,10 @@ def test_forms_offer_every_scene_engine_and_method(flows: Any) -> None:
     [
         ("forward", {"scene": "bodies:\n  OA: 1"}, {"scene": 1}),
         ("select", {"scene": "arm.yaml", "tolerance": 0.01}, {"tolerance": 0}),
-        ("statics", {"time": 1.5, "tolerance": 1e-3, "values": {"gravity": [0, 0]}}, {"time": -1}),
-        ("export", {"to": ["mjcf", "fmu", "nc"], "parameters": ["gravity.1"], "verify": False}, {"to": ["step"]}),
+        ("statics", {"time": 1.5, "tolerance": 1e-3, "set": {"gravity": [0, 0]}}, {"time": -1}),
+        ("export", {"to": ["mjcf", "fmu", "nc"], "parameter": ["gravity.1"], "verify": False}, {"to": ["step"]}),
         ("identify", {"problem": "a: 1\nb: 2", "data": "http://gauss:8001/v1/library/recordings/run"}, {"seeds": []}),
-        ("uncertain", {"study": "uncertain: {}", "values": {"gravity": [0, 0]}}, {"study": 1}),
+        ("uncertain", {"study": "uncertain: {}", "set": {"gravity": [0, 0]}}, {"study": 1}),
         ("design", {"about": "start", "noise": 1e-3, "parameter": "theta1", "rate": None}, {"about": "noon"}),
         ("design", {"data": "run", "duration": 2}, {"noise": -1}),
         ("compare", {"engines": ["gauss", "casadi"]}, {"engines": ["gauss"]}),

@@ -109,7 +109,7 @@ def test_a_study_says_what_it_found_and_its_best_is_a_model(study: Any) -> None:
 
 def test_an_identification_without_any_answer_is_one_line_and_a_failed_run() -> None:
     with pytest.raises(InputError, match=r"solver\.step: 0\.01 s is beyond") as refusal:
-        run.run_flow("identify", {"methods": "least-squares", "values": "{solver.step: 0.01}"})
+        run.run_flow("identify", {"methods": "least-squares", "set": "{solver.step: 0.01}"})
     assert "\n" not in str(refusal.value)
     experiment = _client().get_experiment_by_name("Identification")
     (latest,) = _client().search_runs([experiment.experiment_id], "tags.kind = 'study'", max_results=1)
@@ -129,7 +129,7 @@ def test_a_result_that_is_not_to_be_trusted_comes_back_as_it_is() -> None:
     assert list(found.answer.refused) == ["casadi"]
 
 
-REJECTED = ["scene=single-pendulum", "values={solver.energy_tolerance: 1.0e-18}"]
+REJECTED = ["scene=single-pendulum", "set={solver.energy_tolerance: 1.0e-18}"]
 """No arithmetic conserves energy so well: the run is rejected, whatever the solver."""
 
 
@@ -228,7 +228,7 @@ def test_a_night_is_a_run_with_a_metric_per_line(capsys: pytest.CaptureFixture[s
         ),
         ("export", {"scene": "single-pendulum", "to": "csv,step"}, "to: no form 'step'; there are exudyn, mjcf, fmu"),
         pytest.param(
-            *("export", {"scene": "single-pendulum", "to": "csv", "inputs": "gravity.1"}, "`to` has no fmu"),
+            *("export", {"scene": "single-pendulum", "to": "csv", "input": "gravity.1"}, "`to` has no fmu"),
             marks=pytest.mark.slow,
         ),
         ("sweep", {"vary": "{gravity.1: [-9, 0, 1]}"}, "one value is not at both ends"),
@@ -251,7 +251,7 @@ def test_bad_parameters_are_refused_in_one_line(flow: str, parameters: dict[str,
 def test_a_study_is_repeated_from_its_run_alone(tmp_path: Path) -> None:
     scene = tmp_path / "mine.yaml"
     scene.write_text((files("shoal.scene") / "library" / "single-pendulum.yaml").read_text())
-    first = run.run_flow("forward", {"scene": str(scene), "values": "{initial.OA.angle: 0.4}"})
+    first = run.run_flow("forward", {"scene": str(scene), "set": "{initial.OA.angle: 0.4}"})
     scene.unlink()
     again = rerun(first.run_id)
     assert again.now != first.run_id
@@ -269,7 +269,7 @@ def test_what_is_taken_from_the_library_is_kept_with_the_run(tmp_path: Path) -> 
     machine = yaml.safe_load((files("shoal.scene") / "library" / "single-pendulum.yaml").read_text())
     (tmp_path / "arm.yaml").write_text(yaml.safe_dump(machine))
     library.add(tmp_path / "arm.yaml")
-    motion = simulate("arm", np.linspace(0.0, 0.5, 11), values={"initial.OA.angle": 0.3}, verify=False)
+    motion = simulate("arm", np.linspace(0.0, 0.5, 11), set={"initial.OA.angle": 0.3}, verify=False)
     rows = np.column_stack([motion.times, *motion.marker("A").T])
     (tmp_path / "swing.csv").write_text("t,x,y\n" + "\n".join(",".join(map(repr, row)) for row in rows.tolist()) + "\n")
     library.add(tmp_path / "swing.csv")
@@ -314,7 +314,7 @@ def test_a_scene_may_be_given_as_yaml() -> None:
 def test_exports_are_artifacts_of_their_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of a machine in space, byte for byte what the commands write."""
     monkeypatch.chdir(tmp_path)
-    short = {"values": "{solver.duration: 0.2}"}
+    short = {"set": "{solver.duration: 0.2}"}
     found = run.run_flow("export", {"scene": "spherical-pendulum", "to": "exudyn,csv,nc,fmu", **short})
     assert found.trusted
     (tmp_path / "kept").mkdir()
@@ -327,7 +327,7 @@ def test_exports_are_artifacts_of_their_run(tmp_path: Path, monkeypatch: pytest.
     for name in ("spherical-pendulum.py", "spherical-pendulum.csv"):
         assert kept[name].read_bytes() == (tmp_path / name).read_bytes()
     metrics = _client().get_run(found.run_id).data.metrics
-    last = simulate("spherical-pendulum", values={"solver.duration": 0.2}).marker("A")[-1]
+    last = simulate("spherical-pendulum", set={"solver.duration": 0.2}).marker("A")[-1]
     np.testing.assert_allclose([metrics[f"final/{axis}"] for axis in "xyz"], last, atol=1e-12)
     assert 0 < metrics["final/distance/exudyn"] < 1e-3
     description = zipfile.ZipFile(kept["spherical_pendulum.fmu"]).read("modelDescription.xml").decode()
@@ -338,18 +338,18 @@ def test_exports_are_artifacts_of_their_run(tmp_path: Path, monkeypatch: pytest.
 def test_machines_in_space_are_logged_with_all_their_coordinates() -> None:
     """A pendulum at rest hangs below; engines and motions have three components."""
     short, still = "{solver.duration: 0.1}", "{initial.A.position: [0.6, 0, -0.8], initial.A.velocity: [0, 0, 0]}"
-    compared = run.run_flow("compare", {"scene": "spherical-pendulum", "engines": "gauss,exudyn", "values": short})
+    compared = run.run_flow("compare", {"scene": "spherical-pendulum", "engines": "gauss,exudyn", "set": short})
     assert compared.trusted
     tips = [_client().get_metric_history(child.info.run_id, "tip/z") for child in _children(compared.run_id)]
     assert [len(tip) > 5 for tip in tips] == [True, True]
-    rest = run.run_flow("statics", {"scene": "spherical-pendulum", "values": still})
+    rest = run.run_flow("statics", {"scene": "spherical-pendulum", "set": still})
     metrics = _client().get_run(rest.run_id).data.metrics
     np.testing.assert_allclose([metrics[f"final/A/{axis}"] for axis in "xyz"], [0.0, 0.0, -1.0], atol=1e-9)
 
 
 def test_a_place_of_rest_within_a_tolerance_has_its_error() -> None:
     """The mesh of the strip is refined until the error at its end is told and small."""
-    asked = {"scene": "swinging-strip", "tolerance": "5e-3", "values": "{bodies.strip.elements: 2}"}
+    asked = {"scene": "swinging-strip", "tolerance": "5e-3", "set": "{bodies.strip.elements: 2}"}
     metrics = _client().get_run(run.run_flow("statics", asked).run_id).data.metrics
     assert 0.0 < metrics["final/mesh_error"] <= 2.5e-3
 
@@ -426,7 +426,7 @@ def test_what_else_there_is_of_a_machine_is_logged() -> None:
     """The cheapest model within a tolerance, its place of rest, a design of a measurement; each can be repeated."""
     duration = "{solver.duration: 0.1}"
     asked = {
-        "select": {"scene": "flexible-double-pendulum", "tolerance": "1e-3", "values": duration},
+        "select": {"scene": "flexible-double-pendulum", "tolerance": "1e-3", "set": duration},
         "statics": {"scene": "rigid-double-pendulum"},
         "design": {"problem": "paper-case-1", "about": "start", "noise": "1e-3"},
         "uncertain": {"study": json.dumps(STUDY)},

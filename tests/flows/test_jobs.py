@@ -7,6 +7,7 @@ import pytest
 from shoal.engines.sweep import Sweep
 from shoal.errors import InputError
 from shoal.pictures.signals import residuals
+from shoal.requests.simulate import Simulate
 from shoal_flows import jobs
 from shoal_flows.flows.tables import of_motion
 from shoal_flows.jobs import Fit
@@ -32,10 +33,10 @@ def test_fit_carries_the_motion_of_what_it_found(fits: list[Fit]) -> None:
 
 def test_a_motion_is_verified_and_one_that_a_second_run_contradicts_is_not_trusted() -> None:
     coarse = {"solver.integrator": "rk4", "solver.step": 0.1, "solver.duration": 20.0, "solver.energy_tolerance": 0.5}
-    _, motion = jobs.simulated("single-pendulum", "gauss", coarse)
+    motion = jobs.simulated(Simulate("single-pendulum", set=coarse))[0]
     assert not motion.ok
     assert motion.message.startswith("the time error is about ")
-    good = jobs.simulated("single-pendulum", "gauss", {})[1]
+    good = jobs.simulated(Simulate("single-pendulum"))[0]
     assert "estimated error at the markers: " in of_motion(good)
 
 
@@ -46,7 +47,7 @@ def test_sweep_covers_the_grid(sweep: Sweep) -> None:
 
 def test_unknown_names_are_refused_in_one_line() -> None:
     with pytest.raises(InputError, match="no such scene"):
-        jobs.simulated("nowhere", "gauss", {})
+        jobs.simulated(Simulate("nowhere"))
 
 
 @pytest.mark.parametrize("worst", ["B.y.upper", "A.y.most", "A.y > 0.6"])

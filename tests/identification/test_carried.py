@@ -73,7 +73,7 @@ def test_what_a_recording_has_for_itself_is_left_out() -> None:
 
 def test_they_are_set_in_a_scene_and_what_is_stated_wins(estimate: Estimate, file: Path) -> None:
     assert read_values(file).values == of_estimate(estimate).values
-    expected = shoal.simulate(SCENE, [0.5], values=estimate.values, verify=False).points
+    expected = shoal.simulate(SCENE, [0.5], set=estimate.values, verify=False).points
     for given in (estimate, file, str(file)):
         np.testing.assert_array_equal(shoal.simulate(SCENE, [0.5], values=given, verify=False).points, expected)
     scene = of_estimate(estimate).set_in(shoal.load_scene(SCENE), {"bodies.AB.length": 2.5})
@@ -84,14 +84,14 @@ def test_they_are_set_in_a_scene_and_what_is_stated_wins(estimate: Estimate, fil
 
 
 def test_the_commands_set_them(estimate: Estimate, file: Path) -> None:
-    expected = shoal.simulate(SCENE, [0.5], values=estimate.values, verify=False).marker("B")[-1]
+    expected = shoal.simulate(SCENE, [0.5], set=estimate.values, verify=False).marker("B")[-1]
     arguments = ["simulate", SCENE, "--values", str(file), "--at", "0.5", "--no-verify", "--json"]
     result = CliRunner().invoke(main, arguments)
     assert result.exit_code == 0, result.stderr
     assert json.loads(result.stdout)["final"]["B"] == expected.tolist()
     assert "left out: clock (of the measurement)" in result.stderr
     result = CliRunner().invoke(main, [*arguments, "--set", "bodies.AB.length=2"])
-    other = shoal.simulate(SCENE, [0.5], values={**estimate.values, "bodies.AB.length": 2.0}, verify=False)
+    other = shoal.simulate(SCENE, [0.5], set={**estimate.values, "bodies.AB.length": 2.0}, verify=False)
     assert json.loads(result.stdout)["final"]["B"] == other.marker("B")[-1].tolist()
 
 

@@ -34,7 +34,7 @@ def finest(elements: int) -> dict[str, int]:
 
 def test_of_a_place_of_rest() -> None:
     """Bent far by its own weight."""
-    found, true = shoal.statics(BEAM), shoal.statics(BEAM, values=finest(12), verify=False)
+    found, true = shoal.statics(BEAM), shoal.statics(BEAM, set=finest(12), verify=False)
     error = float(np.linalg.norm(found.marker("tip") - true.marker("tip")))
     assert found.marker("tip")[1] < -0.1
     assert found.mesh_error == pytest.approx(error, rel=0.5)
@@ -42,7 +42,7 @@ def test_of_a_place_of_rest() -> None:
 
 
 def test_of_modes() -> None:
-    found, true = shoal.modes(BEAM, count=3), shoal.modes(BEAM, count=3, values=finest(12), verify=False)
+    found, true = shoal.modes(BEAM, count=3), shoal.modes(BEAM, count=3, set=finest(12), verify=False)
     errors = [abs(1 - one / other) for one, other in zip(found.frequencies, true.frequencies, strict=True)]
     assert found.mesh_errors == pytest.approx(errors, rel=0.5)
     assert [mode["mesh_error"] for mode in found.to_json()["modes"]] == list(found.mesh_errors)

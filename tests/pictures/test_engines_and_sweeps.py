@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from shoal.engines import get_engine
 from shoal.engines.compare import compare
 from shoal.engines.sweep import sweep
+from shoal.notebook import uncertain
 from shoal.pictures import files
 from shoal.pictures.engines import engines
 from shoal.pictures.gaps import gaps
@@ -19,7 +20,6 @@ from shoal.pictures.indices import indices
 from shoal.pictures.response import response
 from shoal.pictures.sweep import sweep as draw_sweep
 from shoal.pictures.uncertainty import uncertainty
-from shoal.response import uncertain
 from shoal.scene import load_scene
 
 
@@ -85,7 +85,7 @@ def test_engines_that_end_at_one_height_are_named_together() -> None:
 @pytest.mark.parametrize("marginal", [(0.9, 1.1), "normal(1, 0.1)"])
 def test_bounds_at_a_single_instant_can_be_seen(marginal: Any) -> None:
     """The chart was empty."""
-    found = uncertain(SCENE, {"initial.OA.angle": marginal}, times=[0.5])
+    found = uncertain(SCENE, {"initial.OA.angle": marginal}, at=[0.5])
     for axes, quantity in zip(response(found, "A").axes, found.axes, strict=True):
         low, high = axes.get_xlim()
         begin, end = axes.patches[0].get_bbox().intervalx
@@ -100,7 +100,7 @@ def test_bounds_at_a_single_instant_can_be_seen(marginal: Any) -> None:
 def test_nothing_is_drawn_between_few_instants(marginal: Any) -> None:
     """A band from 0.5 s to 1.5 s went straight past half a swing; many instants are a band as before."""
     path = "initial.OA.angle"
-    few, many = (uncertain(SCENE, {path: marginal}, times=times) for times in ([0.5, 1.5], np.linspace(0, 1.5, 40)))
+    few, many = (uncertain(SCENE, {path: marginal}, at=times) for times in ([0.5, 1.5], np.linspace(0, 1.5, 40)))
     for found, bands in ((few, False), (many, True)):
         for axes, quantity in zip(response(found, "A").axes, found.axes, strict=True):
             lines = [line for line in axes.lines if line.get_linestyle() != "None" and len(line.get_xdata()) > 2]

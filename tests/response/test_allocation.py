@@ -14,7 +14,7 @@ from scipy import optimize, stats
 from shoal.cli import main
 from shoal.engines import get_engine
 from shoal.errors import ComputationError, InputError
-from shoal.response import uncertain
+from shoal.notebook import uncertain
 from shoal.response.allocation import Allocation, cheapest, with_factors
 from shoal.response.allocation_of_random import Confirmed, Cut
 from shoal.response.allocation_of_random import cheapest as within
@@ -48,9 +48,9 @@ def test_tolerances_of_intervals() -> None:
     found = uncertain(
         Scene.parse(THROWN),
         {UP: (4.8, 5.2), HEIGHT: (-0.2, 0.2), ALONG: (1.9, 2.1)},
-        limits=["P.y > 1.5"],
+        limit=["P.y > 1.5"],
         allocate=True,
-        costs={UP: 2.0},
+        cost={UP: 2.0},
         verify=False,
     )
     assert found.ok
@@ -66,7 +66,7 @@ def test_tolerances_of_intervals() -> None:
     again = uncertain(
         Scene.parse(THROWN),
         list(allocation.allocated.parameters),
-        limits=["P.y > 1.5"],
+        limit=["P.y > 1.5"],
         method="vertices",
         verify=False,
     )
@@ -79,7 +79,7 @@ def test_deviations_of_distributions() -> None:
     found = uncertain(
         Scene.parse(THROWN),
         {UP: "normal(5,0.2)", HEIGHT: "normal(0,0.1)"},
-        limits=["P.y > 1.75"],
+        limit=["P.y > 1.75"],
         allocate=True,
         target=target,
         verify=False,
@@ -108,7 +108,7 @@ def allocated(vary: dict[str, Any], limit: str, target: float, **how: Any) -> Al
     """Of a body thrown upwards that is at h + v / 2 - 1.25 m after half a second."""
     how = {"count": 16, "method": "sobol", **how}
     found = uncertain(
-        Scene.parse(THROWN), vary, [0.5], limits=[limit], allocate=True, target=target, verify=False, **how
+        Scene.parse(THROWN), vary, [0.5], limit=[limit], allocate=True, target=target, verify=False, **how
     )
     assert found.ok, found.message
     assert found.allocation is not None
@@ -229,7 +229,7 @@ def test_an_interval_and_a_deviation_together(target: float) -> None:
     """
     found = uncertain(
         *(Scene.parse(THROWN), {UP: "normal(5,0.3)", HEIGHT: (-0.05, 0.1), ALONG: (1.9, 2.1)}, [0.5]),
-        **dict[str, Any](limits=["P.y > 1.9"], limit_runs=2000, verify=False),
+        **dict[str, Any](limit=["P.y > 1.9"], limit_runs=2000, verify=False),
         **dict[str, Any](allocate=True, target=target, costs={HEIGHT: 1.5}),
     )
     assert found.ok, found.message
@@ -284,7 +284,7 @@ def test_an_interval_that_reaches_beyond_the_limit() -> None:
     """The stated upper end passes it half of the times and more; narrower ones keep it."""
     found = uncertain(
         *(Scene.parse(THROWN), {UP: "normal(5,0.2)", HEIGHT: (-0.5, 0.5)}, [0.5]),
-        **dict[str, Any](limits=["P.y > 1.7"], limit_runs=600, verify=False, allocate=True, target=1e-2),
+        **dict[str, Any](limit=["P.y > 1.7"], limit_runs=600, verify=False, allocate=True, target=1e-2),
     )
     assert found.ok, found.message
     assert found.allocation is not None
@@ -293,7 +293,7 @@ def test_an_interval_that_reaches_beyond_the_limit() -> None:
     with pytest.raises(ComputationError, match="does not hold at the middle values"):
         uncertain(
             *(Scene.parse(THROWN), {UP: "normal(5,0.2)", HEIGHT: (-0.5, 0.5)}, [0.5]),
-            **dict[str, Any](limits=["P.y > 1.2"], limit_runs=600, verify=False, allocate=True, target=1e-2),
+            **dict[str, Any](limit=["P.y > 1.2"], limit_runs=600, verify=False, allocate=True, target=1e-2),
         )
 
 
@@ -313,11 +313,11 @@ def test_a_probability_of_nothing_is_not_near_the_target() -> None:
 def test_what_cannot_be_allocated_is_refused() -> None:
     scene, vary = Scene.parse(THROWN), {UP: (4.8, 5.2)}
     with pytest.raises(ComputationError, match="middle values"):
-        uncertain(scene, vary, limits=["P.y > 1.0"], allocate=True, verify=False)
+        uncertain(scene, vary, limit=["P.y > 1.0"], allocate=True, verify=False)
     with pytest.raises(InputError, match="needs one limit"):
         uncertain(scene, vary, allocate=True, verify=False)
     with pytest.raises(InputError, match="cost: 'x' is not varied"):
-        uncertain(scene, vary, limits=["P.y > 2"], allocate=True, costs={"x": 1.0}, verify=False)
+        uncertain(scene, vary, limit=["P.y > 2"], allocate=True, cost={"x": 1.0}, verify=False)
 
 
 @pytest.mark.parametrize(
@@ -334,7 +334,7 @@ def test_scaled_tolerances(marginal: Interval | Normal | Frozen) -> None:
 
 def test_the_worst_case_as_a_scene(tmp_path: Path) -> None:
     """Its own run passes the limit by what the study says, or attains the bound."""
-    found = uncertain(Scene.parse(THROWN), {UP: (4.7, 5.3), ALONG: (1.7, 2.3)}, limits=["P.y > 1.3", "P.speed > 9"])
+    found = uncertain(Scene.parse(THROWN), {UP: (4.7, 5.3), ALONG: (1.7, 2.3)}, limit=["P.y > 1.3", "P.speed > 9"])
     one, other = worst(found)
     assert (one.of, other.of) == ("P.y > 1.3", "P.speed > 9")
     file = tmp_path / "worst.yaml"

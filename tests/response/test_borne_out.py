@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from shoal.response import uncertain
+from shoal.notebook import uncertain
 from sliding import puck
 
 

@@ -15,8 +15,9 @@ from scipy.stats import qmc
 from shoal.cli import main
 from shoal.engines import get_engine
 from shoal.errors import InputError
+from shoal.notebook import uncertain
 from shoal.pictures import files
-from shoal.response import Response, respond, uncertain
+from shoal.response import Response, respond
 from shoal.response.inputs import Inputs, Parameter
 from shoal.response.marginals import Frozen, Interval, Normal, Uniform
 from shoal.response.runs import Answers
@@ -45,7 +46,7 @@ def test_a_deviation_is_that_of_runs_and_not_of_polynomials_beyond_them() -> Non
     """
     ways = {"initial.OA.angle": ("-2%", "2%"), "bodies.AB.length": stats.norm(2.0, 0.01)}
     times = [0.46, 0.47, 0.48, 0.49, 0.5]
-    found = uncertain("flexible-double-pendulum", ways, times=times)
+    found = uncertain("flexible-double-pendulum", ways, at=times)
     drawn = stats.norm(2.0, 0.01).ppf(qmc.Sobol(1, rng=3).random_base2(9)[:, 0])
     assert found.boxes is not None
     scene, told = load_scene("flexible-double-pendulum"), found.to_json()["statistics"]["A"]["angle"]
@@ -199,7 +200,7 @@ def test_beyond_the_horizon_runs_tell() -> None:
 
 
 def study(vary: dict[str, object], limit: str, times: list[float]) -> Response:
-    return uncertain(Scene.parse(THROWN), vary, times, limits=[limit], limit_runs=2000, verify=False, seed=2)
+    return uncertain(Scene.parse(THROWN), vary, times, limit=[limit], limit_runs=2000, verify=False, seed=2)
 
 
 def test_a_linear_limit_with_an_interval_mean() -> None:
@@ -250,7 +251,7 @@ def test_the_command_and_its_files(tmp_path: Path) -> None:
     """The same numbers in the table, in JSON, in NetCDF and on the page; a study that is kept gives them again."""
     xr = pytest.importorskip("xarray")
     vary = {UP: "normal(5,0.3)", HEIGHT: (-0.05, 0.1)}
-    found = uncertain(Scene.parse(THROWN), vary, [0.25, 0.5], limits=["P.y > 1.7"], limit_runs=500, verify=False)
+    found = uncertain(Scene.parse(THROWN), vary, [0.25, 0.5], limit=["P.y > 1.7"], limit_runs=500, verify=False)
     files.response(found, tmp_path / "study.nc")
     with xr.open_dataset(tmp_path / "study.nc") as data:
         y = data.sel(marker="P", axis="y")

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 from scipy import stats
-from shoal.response import uncertain
+from shoal.notebook import uncertain
 from shoal.response.limits import limit
 from shoal.response.limits.counted import contradiction
 from shoal.response.limits.crosschecked import shifts
@@ -22,7 +22,7 @@ BALL = {"name": "ball", "bodies": {"b": {"kind": "point-mass", "mass": 1.0}}, "m
 
 def test_a_refused_study_keeps_no_limit() -> None:
     """Where the machine goes is not known; so that a limit of its angle is kept is not told either."""
-    found = uncertain(puck(0.4, 0.12, 2000.0), ["initial.P.position.1=-1:1"], [2.0], limits=["P.angle < 1"])
+    found = uncertain(puck(0.4, 0.12, 2000.0), ["initial.P.position.1=-1:1"], [2.0], limit=["P.angle < 1"])
     assert not found.ok
     assert found.limits[0].kept is not True
 
@@ -74,7 +74,7 @@ def test_mean_and_deviation_allow_for_the_probability_beside_them(seed: int) -> 
     """2e-3 of all pucks hit a pin of 4 mm and turn round; of 128 runs none does, and all say x = 1 m."""
     found = uncertain(
         *(puck(0.3, 0.004, 2e6), ["initial.P.position.1~normal(0,0.15)"], [2.0]),
-        **{"limits": ["P.x < 0.5"], "seed": seed, "verify": False},
+        **{"limit": ["P.x < 0.5"], "seed": seed, "verify": False},
     )
     assert found.statistics is not None
     told = found.statistics
@@ -88,7 +88,7 @@ def test_mean_and_deviation_allow_for_the_probability_beside_them(seed: int) -> 
 
 def test_a_limit_that_is_stated_the_other_way_round_is_noted() -> None:
     noted, plain = (
-        uncertain(Scene.parse(BALL), ["initial.b.velocity.0~normal(1,0.01)"], [1.0], limits=[text], verify=False)
+        uncertain(Scene.parse(BALL), ["initial.b.velocity.0~normal(1,0.01)"], [1.0], limit=[text], verify=False)
         for text in ("b.x > 0.5", "b.x > 1.01")
     )
     assert "is it required (--require)?" in noted.limits[0].note

@@ -13,7 +13,7 @@ from click.testing import CliRunner
 from scipy import optimize, special, stats
 from shoal.cli import main
 from shoal.errors import InputError
-from shoal.response import uncertain
+from shoal.notebook import uncertain
 from shoal.response.limits.choice import WAYS
 from shoal.response.limits.limit import limit
 from shoal.scene import Scene, load_scene
@@ -49,7 +49,7 @@ def worst(text: str, angle: float) -> float:
 )
 def test_forces_in_a_joint_with_intervals(text: str, kept: bool) -> None:
     """The least margin is that of the closed form over a dense scan of the angle."""
-    found = uncertain(PENDULUM, {START: (-1.2, -1.0)}, TIMES, limits=[text], verify=False)
+    found = uncertain(PENDULUM, {START: (-1.2, -1.0)}, TIMES, limit=[text], verify=False)
     told = found.to_json()["limits"][0]
     assert told["kept"] is kept
     assert told["unit"] == "N"
@@ -65,7 +65,7 @@ def test_the_probability_of_a_force_in_a_joint() -> None:
     exact = stats.norm.sf((edge - mean) / deviation)
     found = uncertain(
         *(PENDULUM, [f"{START}~normal({mean},{deviation})"], TIMES),
-        **dict[str, Any](limits=[text], limit_method="form", verify=False, method="sobol", count=16),
+        **dict[str, Any](limit=[text], limit_method="form", verify=False, method="sobol", count=16),
     )
     told = found.to_json()["limits"][0]
     assert told["probability"] == pytest.approx(exact, rel=1e-3)
@@ -81,7 +81,7 @@ def test_a_rare_force_by_importance_sampling() -> None:
     exact = stats.norm.sf((edge - mean) / deviation)
     found = uncertain(
         *(PENDULUM, [f"{START}~normal({mean},{deviation})"], times),
-        **dict[str, Any](limits=[text], limit_runs=1500, verify=False, method="sobol", count=16),
+        **dict[str, Any](limit=[text], limit_runs=1500, verify=False, method="sobol", count=16),
     )
     told = found.to_json()["limits"][0]
     assert told["lower"] <= exact <= told["upper"]
@@ -95,7 +95,7 @@ def test_the_probability_of_an_energy_by_every_way(way: str) -> None:
     exact = stats.norm.sf((math.asin(bound / G) - mean) / deviation)
     found = uncertain(
         *(PENDULUM, [f"{START}~normal({mean},{deviation})"], [0.2, 0.4]),
-        **dict[str, Any](limits=[f"energy > {bound}"], limit_method=way, limit_runs=400, verify=False),
+        **dict[str, Any](limit=[f"energy > {bound}"], limit_method=way, limit_runs=400, verify=False),
         **dict[str, Any](method="sobol", count=16),
     )
     told = found.to_json()["limits"][0]
@@ -118,7 +118,7 @@ def test_energies_of_an_oscillator() -> None:
         ("potential > 1.9", whole - moving.min()),
         ("energy > 1.9", whole),
     ):
-        found = uncertain(scene, {"bodies.P.mass": (1.9, 2.1)}, times, limits=[text], verify=False)
+        found = uncertain(scene, {"bodies.P.mass": (1.9, 2.1)}, times, limit=[text], verify=False)
         assert found.limits[0].margin == pytest.approx(1.9 - extreme, abs=1e-6), text
         assert found.limits[0].kept, text
         assert found.ok, text
@@ -130,7 +130,7 @@ def test_energies_of_a_torsion_spring_that_is_wound_up() -> None:
         Scene.parse(oscillator(turned=True)),
         {"bodies.P.inertia": (0.9, 1.1)},
         [0.7, 0.9],
-        limits=["energy > 100", "potential > 100"],
+        limit=["energy > 100", "potential > 100"],
         verify=False,
     )
     held, stiffness = 2.5 * math.pi, 2.0
@@ -151,7 +151,7 @@ def test_a_parameter_that_is_a_number_in_a_table() -> None:
     data["loads"]["push"] = {"kind": "force", "at": own, "force": [1.0, 2.0], "scale": table}
     ends = {"loads.push.scale.table.0.1,loads.push.scale.table.1.1": (1.0, 2.0)}
     limits = ["abs(guide.fy) > 5", "kinetic > 2", "P.x > 1"]
-    found = uncertain(Scene.parse(data), ends, times, limits=limits, verify=False)
+    found = uncertain(Scene.parse(data), ends, times, limit=limits, verify=False)
     assert found.ok, found.message
     rate, swing = math.sqrt(20.0), 0.3 - np.array([[1.0], [2.0]]) / 40
     assert found.limits[0].margin == pytest.approx(5 - 4, abs=1e-8)
@@ -209,7 +209,7 @@ def test_a_force_that_is_not_unique_is_refused_before_the_study() -> None:
     data["joints"]["second"] = {**data["joints"]["guide"], "first": {"body": "ground", "point": [1.0, 0.0]}}
     runs: list[int] = []
     with pytest.raises(InputError, match=r"limit: second\.fy > 1: the forces of joint second are not unique"):
-        uncertain(Scene.parse(data), {"bodies.P.mass": (1.9, 2.1)}, limits=["second.fy > 1"], progress=runs.append)
+        uncertain(Scene.parse(data), {"bodies.P.mass": (1.9, 2.1)}, limit=["second.fy > 1"], progress=runs.append)
     assert not runs
 
 

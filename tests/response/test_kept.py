@@ -7,7 +7,8 @@ from typing import Any
 
 import pytest
 from shoal.errors import ComputationError, InputError
-from shoal.response import Response, uncertain
+from shoal.notebook import uncertain
+from shoal.response import Response
 from shoal.response.kept import Keep
 from shoal.response.machine import Machine
 from shoal.scene import Scene
@@ -26,7 +27,7 @@ def told(found: Response) -> dict[str, Any]:
 
 def test_a_study_that_was_broken_off_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Killed in the middle of a limit, half of its last runs written: the answer is that of one that was not."""
-    how: dict[str, Any] = {"limits": ["P.y > 1.75"], "limit_runs": 1500}
+    how: dict[str, Any] = {"limit": ["P.y > 1.75"], "limit_runs": 1500}
     whole, file = study(RANDOM, **how), tmp_path / "runs"
     made, original = [0], Machine._some
 
@@ -74,7 +75,7 @@ def test_a_study_ends_with_its_time(vary: dict[str, Any], monkeypatch: pytest.Mo
         return original(keep, *arguments)
 
     monkeypatch.setattr(Keep, "__call__", late)
-    found = study(vary, time_limit=1000.0, limits=["P.y > 1.75"])
+    found = study(vary, time_limit=1000.0, limit=["P.y > 1.75"])
     assert found.status == "time-limit"
     assert "nothing is known of P.y > 1.75" in found.message
     assert found.evaluations > 0

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 from scipy import stats
 from shoal.cli import main
 from shoal.errors import InputError
-from shoal.response import uncertain
+from shoal.notebook import uncertain
 from shoal.response.inputs import Inputs, Parameter
 from shoal.response.limits.choice import WAYS, probability
 from shoal.response.limits.estimate import weighted
@@ -178,9 +178,7 @@ def test_other_distributions_are_brought_to_normal_ones() -> None:
 def test_a_thrown_body() -> None:
     """P(v^2 / 20 > h), v normal, and the distribution of the first passage: both in closed form."""
     height = 2.0
-    found = uncertain(
-        Scene.parse(THROWN), [f"{UP}~normal(5,0.3)", f"{ALONG}~normal(2,0.3)"], limits=[f"P.y > {height}"]
-    )
+    found = uncertain(Scene.parse(THROWN), [f"{UP}~normal(5,0.3)", f"{ALONG}~normal(2,0.3)"], limit=[f"P.y > {height}"])
     assert found.ok
     (told,) = found.to_json()["limits"]
     passage = told["first_passage"]
@@ -204,7 +202,7 @@ def test_a_thrown_body() -> None:
 )
 def test_limits_of_intervals(text: str, passed: bool) -> None:
     """Heights up to 5.3^2 / 20 = 1.4045; speeds up to sqrt(28.09 + 5.29); falling at most at 10 - 4.7."""
-    found = uncertain(Scene.parse(THROWN), {UP: (4.7, 5.3), ALONG: (1.7, 2.3)}, limits=[text])
+    found = uncertain(Scene.parse(THROWN), {UP: (4.7, 5.3), ALONG: (1.7, 2.3)}, limit=[text])
     (judged,) = found.limits
     assert judged.kept is not passed
     shown = judged.shown
@@ -250,9 +248,7 @@ def test_a_double_pendulum_against_plain_sampling() -> None:
     vary.append("bodies.AB.length~normal(2,0.02)")
     known, text = parameters(vary, scene), "B.speed > 14.5"
     auto, plain = (
-        uncertain(
-            scene, known, limits=[text], limit_method=way, limit_runs=runs, method="sobol", count=64, verify=False
-        )
+        uncertain(scene, known, limit=[text], limit_method=way, limit_runs=runs, method="sobol", count=64, verify=False)
         .limits[0]
         .passing
         for way, runs in (("auto", 5000), ("monte-carlo", 20_000))

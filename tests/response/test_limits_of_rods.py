@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from shoal.engines.gauss import GaussEngine
 from shoal.errors import InputError
-from shoal.response import uncertain
+from shoal.notebook import uncertain
 from shoal.response.limits.dynamic import along, asked
 from shoal.response.limits.limit import limit
 from shoal.scene import Scene, load_scene
@@ -39,7 +39,7 @@ def cantilever() -> Scene:
 
 def margins(scene: Scene, limits: list[str], path: str, ends: tuple[float, float]) -> list[float]:
     """The least ones at rest, of all values of a field between two."""
-    found = uncertain(scene, {path: ends}, [0.5], limits=limits, verify=False)
+    found = uncertain(scene, {path: ends}, [0.5], limit=limits, verify=False)
     assert found.ok, found.message
     return [one.margin for one in found.limits]
 
@@ -117,7 +117,7 @@ def test_the_energy_of_a_machine_that_bends() -> None:
     def energy(angle: float) -> float:
         return G * (lengths[0] * np.sin(angle) * (lower[0] / 2 + lower[1]) + lengths[1] * np.sin(other) * lower[1] / 2)
 
-    found = uncertain(scene, {path: (0.75, 0.8)}, [0.1, 0.2], limits=["energy > 100"], verify=False)
+    found = uncertain(scene, {path: (0.75, 0.8)}, [0.1, 0.2], limit=["energy > 100"], verify=False)
     assert found.limits[0].margin == pytest.approx(100 - energy(0.8), rel=1e-6)
 
 
@@ -125,7 +125,7 @@ def test_the_force_and_the_energy_of_a_pendulum_in_space() -> None:
     """m g cos p + m v^2 / L from the conservation of energy, whatever the plane in which it swings."""
     scene, path, times = load_scene("spherical-pendulum"), "initial.A.velocity.1", [0.2, 0.4]
     ends = (1.7, 1.8)
-    found = uncertain(scene, {path: ends}, times, limits=["energy > 5", "O.force > 30"], verify=False)
+    found = uncertain(scene, {path: ends}, times, limit=["energy > 5", "O.force > 30"], verify=False)
     assert found.ok, found.message
     assert found.limits[0].margin == pytest.approx(5 - (0.5 * ends[1] ** 2 - G / 2), abs=1e-8)
     assert found.bounds is not None
@@ -144,7 +144,7 @@ def test_sections_between_loads_are_refused_before_the_study() -> None:
     with pytest.raises(InputError, match=told):
         uncertain(
             *(Scene.parse(stated), {"bodies.rod.density": (900.0, 1100.0)}, [0.1]),
-            **dict[str, Any](limits=["middle.moment > 1"], progress=runs.append),
+            **dict[str, Any](limit=["middle.moment > 1"], progress=runs.append),
         )
     assert not runs
 
@@ -152,7 +152,7 @@ def test_sections_between_loads_are_refused_before_the_study() -> None:
 def test_another_engine_tells_no_section_forces() -> None:
     scene = load_scene("flexible-double-pendulum")
     with pytest.raises(InputError, match="told by the engine gauss alone; found exudyn"):
-        uncertain(scene, {"initial.OA.angle": (0.75, 0.8)}, [0.1], limits=["O.force > 3"], engine="exudyn")
+        uncertain(scene, {"initial.OA.angle": (0.75, 0.8)}, [0.1], limit=["O.force > 3"], engine="exudyn")
     assert limit("B.normal > 3", scene).unit == "N"
 
 
@@ -163,5 +163,5 @@ def test_a_model_that_is_chosen_for_a_limit_tells_it() -> None:
     moment = densities[1] * G * AREA * LENGTH**2 / 2
     asked = [f"root.moment < {-moment * share}" for share in (0.97, 1.03)]
     settled = cantilever().with_values({"initial_from": "statics", "solver.duration": 0.005})
-    told = uncertain(settled, {"bodies.rod.density": densities}, limits=asked, tolerance=0.1)
+    told = uncertain(settled, {"bodies.rod.density": densities}, limit=asked, tolerance=0.1)
     assert [one.kept for one in told.limits] == [False, True]

@@ -8,7 +8,8 @@ import numpy as np
 import one_body
 import pytest
 from shoal.errors import InputError
-from shoal.response import respond, uncertain
+from shoal.notebook import uncertain
+from shoal.response import respond
 from shoal.response.inputs import Inputs, Parameter
 from shoal.response.marginals import Interval
 from shoal.response.respond import Answer

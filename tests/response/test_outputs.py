@@ -7,9 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from shoal.notebook import uncertain
 from shoal.pictures import files
 from shoal.pictures.probability import probability
-from shoal.response import Response, uncertain
+from shoal.response import Response
 from shoal.scene import Scene
 from shoal.terminal.tables import response_table
 from thrown import ALONG, THROWN, UP
@@ -19,7 +20,7 @@ HEIGHT = "initial.P.position.1"
 
 @pytest.fixture(scope="module")
 def intervals() -> Response:
-    return uncertain(Scene.parse(THROWN), {UP: (4.7, 5.3), ALONG: (1.7, 2.3)}, [0.25, 0.5, 0.75], limits=["P.y > 1.3"])
+    return uncertain(Scene.parse(THROWN), {UP: (4.7, 5.3), ALONG: (1.7, 2.3)}, [0.25, 0.5, 0.75], limit=["P.y > 1.3"])
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +29,7 @@ def distributions() -> Response:
         Scene.parse(THROWN),
         {UP: "normal(5,0.2)", HEIGHT: "normal(0,0.1)"},
         [0.25, 0.5, 0.75],
-        limits=["P.y > 1.75"],
+        limit=["P.y > 1.75"],
         limit_runs=1000,
     )
 
@@ -61,7 +62,7 @@ def test_a_limit_that_is_kept_is_kept_at_the_instants_looked_at(
 ) -> None:
     """Thrown up at 5 m/s, the point is above 1.2 m at its top (v^2 / 2 g = 1.25 m), not at the two instants stated."""
     looked = [0.1, 0.9]
-    found = uncertain(Scene.parse(THROWN), {UP: (4.99, 5.01)}, looked, limits=["P.y > 1.2"])
+    found = uncertain(Scene.parse(THROWN), {UP: (4.99, 5.01)}, looked, limit=["P.y > 1.2"])
     (judged,) = found.limits
     assert judged.kept
     assert judged.shown is not None
@@ -75,7 +76,7 @@ def test_a_limit_that_is_kept_is_kept_at_the_instants_looked_at(
     page = (tmp_path / "page.html").read_text()
     assert "kept at the 2 instants looked at" in page
     assert "passes it between the instants looked at" in page
-    below = uncertain(Scene.parse(THROWN), {UP: (4.99, 5.01)}, looked, limits=["P.y > 1.3"]).limits[0]
+    below = uncertain(Scene.parse(THROWN), {UP: (4.99, 5.01)}, looked, limit=["P.y > 1.3"]).limits[0]
     assert below.kept
     assert (below.note, below.shown is not None and below.shown.between is None) == ("", True)
 
@@ -83,7 +84,7 @@ def test_a_limit_that_is_kept_is_kept_at_the_instants_looked_at(
 @pytest.mark.parametrize(("limit", "passes"), [("abs(P.vy) < 1e-4", 0.5), ("abs(P.vy) < 0", None), ("P.vy < -4", None)])
 def test_a_quantity_that_changes_sign_passes_its_least_size_between_instants(limit: str, passes: float | None) -> None:
     """At 5 m/s upwards vy vanishes at its top after 0.5 s, for a tenth of the time between two of 200 instants."""
-    found = uncertain(Scene.parse(THROWN), {UP: (4.99, 5.01)}, [0.1, 0.3, 0.74, 0.89], limits=[limit])
+    found = uncertain(Scene.parse(THROWN), {UP: (4.99, 5.01)}, [0.1, 0.3, 0.74, 0.89], limit=[limit])
     (judged,) = found.limits
     assert judged.kept
     assert judged.shown is not None
@@ -113,7 +114,7 @@ def test_a_limit_that_no_run_has_passed_is_drawn_below_what_it_may_be(way: str, 
     """At the instants looked at; no probability is below zero, and one that is not known may be anything."""
     found = uncertain(
         *(Scene.parse(THROWN), {UP: "normal(5,0.2)"}, [0.25, 0.75]),
-        limits=["P.x > 9"],
+        limit=["P.x > 9"],
         limit_runs=300,
         limit_method=way,
     )

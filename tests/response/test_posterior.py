@@ -14,8 +14,8 @@ from shoal.engines import get_engine
 from shoal.errors import InputError
 from shoal.identification import Estimate, Problem, identify
 from shoal.identification.conclude import Wishes
+from shoal.notebook import uncertain
 from shoal.pictures import files
-from shoal.response import uncertain
 from shoal.response.inputs import Inputs
 from shoal.response.read import parameters
 from shoal.scene import load_scene

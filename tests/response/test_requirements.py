@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 from shoal.cli import main
 from shoal.errors import InputError
-from shoal.response import uncertain
+from shoal.notebook import uncertain
 from shoal.response.inputs import Inputs, Parameter
 from shoal.response.limits import limit, read_limits, requirement
 from shoal.response.marginals import Interval, Normal
@@ -65,7 +65,7 @@ def test_a_refused_run_at_the_design_point_is_a_doubt_and_costs_no_answer(
         raise InputError("joints.c: cannot be assembled")
 
     monkeypatch.setattr(importlib.import_module("shoal.response.limits.judge"), "show", refused)
-    found = uncertain(SCENE, {UP: known}, [0.5], limits=["P.y > 1.3"], limit_runs=300)
+    found = uncertain(SCENE, {UP: known}, [0.5], limit=["P.y > 1.3"], limit_runs=300)
     assert not found.ok
     assert "cannot be assembled" in found.message
     (told,) = found.to_json()["limits"]
@@ -78,7 +78,7 @@ def test_a_wrong_cost_is_refused_before_the_study(monkeypatch: pytest.MonkeyPatc
     module = importlib.import_module("shoal.response.uncertain")
     monkeypatch.setattr(module, "respond", lambda *_, **__: pytest.fail("the study was made"))
     with pytest.raises(InputError, match="cost"):
-        uncertain(SCENE, {UP: (4.7, 5.3)}, limits=["P.y > 1.3"], allocate=True, costs={"initial.P.vel": 2.0})
+        uncertain(SCENE, {UP: (4.7, 5.3)}, limit=["P.y > 1.3"], allocate=True, cost={"initial.P.vel": 2.0})
 
 
 def test_the_command_says_which_side_is_required() -> None:

@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner
 from shoal.cli import main
 from shoal.errors import InputError
-from shoal.response import uncertain
+from shoal.notebook import uncertain
 from shoal.scene import load_scene
 from shoal_validation.problems.in_space import swing
 from shoal_validation.problems.one_angle import G
@@ -45,7 +45,7 @@ def test_bounds_of_all_coordinates_are_those_of_the_equations() -> None:
 @pytest.mark.slow
 def test_statistics_and_the_probability_of_a_limit_on_z() -> None:
     bound = float(places(-9.85)[1, 2])
-    found = uncertain(PENDULUM, {"gravity.2": "uniform(-9.9, -9.7)"}, TIMES, limits=[f"A.z > {bound:.12f}"])
+    found = uncertain(PENDULUM, {"gravity.2": "uniform(-9.9, -9.7)"}, TIMES, limit=[f"A.z > {bound:.12f}"])
     assert found.statistics is not None
     known = np.array([places(gravity)[:, 2] for gravity in np.linspace(LOW, HIGH, 2001)])
     assert found.column("A", "z", found.statistics.mean) == pytest.approx(known.mean(axis=0), abs=1e-6)
@@ -58,12 +58,12 @@ def test_statistics_and_the_probability_of_a_limit_on_z() -> None:
 @pytest.mark.parametrize("limit", ["A.angle > 1", "A.rate > 1"])
 def test_an_angle_in_the_plane_is_no_limit_in_space(limit: str) -> None:
     with pytest.raises(InputError, match="there are x, y, z, vx, vy, vz, speed"):
-        uncertain(PENDULUM, {"gravity.2": (LOW, HIGH)}, TIMES, limits=[limit])
+        uncertain(PENDULUM, {"gravity.2": (LOW, HIGH)}, TIMES, limit=[limit])
 
 
 def test_z_is_no_limit_in_the_plane() -> None:
     with pytest.raises(InputError, match="no quantity 'z'"):
-        uncertain("single-pendulum", {"bodies.OA.mass": (0.9, 1.1)}, TIMES, limits=["A.z > 1"])
+        uncertain("single-pendulum", {"bodies.OA.mass": (0.9, 1.1)}, TIMES, limit=["A.z > 1"])
 
 
 @pytest.mark.parametrize("suffix", [".html", ".png", ".csv"])

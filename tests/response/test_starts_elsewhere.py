@@ -6,8 +6,9 @@ import math
 from pathlib import Path
 from typing import Any
 
+from shoal.notebook import uncertain
 from shoal.pictures.uncertainty import uncertainty
-from shoal.response import Response, uncertain
+from shoal.response import Response
 from shoal.scene import Scene
 
 ANGLE, CRANK, LINE = 1.2, 0.3, 0.1

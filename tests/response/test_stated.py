@@ -70,7 +70,7 @@ def test_a_file_is_read_the_same_way_without_the_command(tmp_path: Path) -> None
     (tmp_path / "study.yaml").write_text(STUDY)
     told = json.loads(run(str(tmp_path / "study.yaml")).stdout)
     study = load_study(str(tmp_path / "study.yaml"))
-    found = uncertain(study.machine(), **study.asked()).to_json()
+    found = uncertain(study, study.machine()).to_json()
     assert {**found, "wall_s": 0} == {**told, "wall_s": 0}
     assert "pendulum-tolerances" in built_in_studies()
     assert load_study("pendulum-tolerances").machine().name == "flexible-double-pendulum"

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from shoal import simulate
 from shoal.engines import get_engine
 from shoal.errors import InputError
-from shoal.response import uncertain
+from shoal.notebook import uncertain
 from shoal.response.machine import Machine
 from shoal.scene import Scene
 from shoal.trajectory import Status
@@ -131,7 +131,7 @@ def test_a_run_that_another_integrator_can_make() -> None:
 @pytest.mark.slow
 def test_the_worst_case_beyond_the_stable_step_can_be_run() -> None:
     ends = {"loads.stiff-spring.stiffness": (STIFF, 2 * STIFF), "loads.soft-spring.stiffness": (3.8, 4.2)}
-    found = uncertain(springs(STEP), ends, [END], limits=["P.x < -0.06"])
+    found = uncertain(springs(STEP), ends, [END], limit=["P.x < -0.06"])
     assert found.ok, found.message
     assert found.repeated > 0
     shown = found.limits[0].shown

@@ -13,7 +13,7 @@ from one_body import pendulum
 from shoal.cli import main
 from shoal.engines import get_engine
 from shoal.errors import InputError
-from shoal.response import uncertain
+from shoal.notebook import uncertain
 from shoal.scene import Scene, load_scene
 
 PENDULUM = pendulum(
@@ -50,7 +50,7 @@ def test_bounds_are_attained() -> None:
     for name, at in (("lower", found.bounds.at_lower), ("upper", found.bounds.at_upper)):
         values = found.column("B", "x", at.T)[:, -1]
         given = dict(zip(vary, values.tolist(), strict=True))
-        run = shoal.simulate("flexible-double-pendulum", [0.25, 0.5], values=given, verify=False)
+        run = shoal.simulate("flexible-double-pendulum", [0.25, 0.5], set=given, verify=False)
         assert run.marker("B")[-1, 0] == pytest.approx(
             found.column("B", "x", getattr(found.bounds, name))[-1], abs=1e-9
         )
@@ -214,7 +214,7 @@ def test_the_finer_mesh_tells_which_bounds_move() -> None:
     values = {**dict(zip(vary, at.tolist(), strict=True)), **told["finer_mesh"]["mesh"]}
     # Twice the elements bear half the step at most.
     step = {"solver.integrator": "leapfrog", "solver.step": found.stated.solver.step / 8}
-    run = shoal.simulate(found.stated, [0.25, 0.5], values={**values, **step}, verify=False)
+    run = shoal.simulate(found.stated, [0.25, 0.5], set={**values, **step}, verify=False)
     assert run.ok
     when, mark = list(found.times).index(most["t"]), run.markers.index(marker)
     there = run.angles[when, mark, 0] if quantity == "angle" else run.points[when, mark, "xy".index(quantity), 0]

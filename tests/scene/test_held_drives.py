@@ -29,7 +29,7 @@ def driven(angle: object, duration: float) -> Scene:
 @pytest.mark.parametrize("suffix", ["csv", "parquet"])
 def test_a_motion_that_is_written_from_its_start_on_drives_without_a_jump(suffix: str, tmp_path: Path) -> None:
     scene = Scene.parse({**FREE, "gravity": [0, 0], "initial": {"A": {"angle": 0.4, "rate": 2.0}}})
-    motion = shoal.simulate(scene, times=np.linspace(0.0, 1.0, 51))
+    motion = shoal.simulate(scene, at=np.linspace(0.0, 1.0, 51))
     path = tmp_path / f"run.{suffix}"
     frame = motion.to_pandas().reset_index()
     frame.to_csv(path, index=False) if suffix == "csv" else frame.to_parquet(path)
@@ -44,7 +44,7 @@ def test_a_motion_that_is_written_from_its_start_on_drives_without_a_jump(suffix
     )
     scene = load_scene(str(tmp_path / "driven.yaml"))
     assert held_drives(scene) == []
-    again = shoal.simulate(scene, times=np.linspace(0.0, 1.0, 51))
+    again = shoal.simulate(scene, at=np.linspace(0.0, 1.0, 51))
     assert again.angle("T") == pytest.approx(motion.angle("T"), abs=1e-9)
 
 
@@ -75,7 +75,7 @@ def test_where_a_table_does_not_cover_the_motion_its_hold_and_its_jump_are_told(
 
 def test_runs_and_pages_tell_it() -> None:
     scene = driven({"table": [[0.2, 0.0], [0.4, 0.1], [0.6, 0.3], [0.8, 0.6]]}, 0.8)
-    motion = shoal.simulate(scene, times=[0.3])
+    motion = shoal.simulate(scene, at=[0.3])
     (line,) = motion.model["held_drives"]
     assert line in remarks(motion.model)
     assert "until then it holds 0 rad" in line

@@ -6,6 +6,7 @@ from contextlib import ExitStack
 
 from prefect import flow
 from shoal.engines.compare import Comparison
+from shoal.requests.compare import Compare
 
 from shoal_flows.flows.runner import side_by_side
 from shoal_flows.flows.study import Draw, Running, open_running
@@ -26,7 +27,7 @@ METHOD_PICTURES: dict[str, Draw] = {
 def demo() -> DemoResult:
     """Identify both cases by every method and on four meshes; compare the engines on both scenes."""
     measured = {case: measure.submit(case, None) for case in (*CASES, *SAME_MESH.values())}
-    compared = {case: run_engines.submit(scene, None, {}) for case, scene in CASES.items()}
+    compared = {case: run_engines.submit(Compare(scene)) for case, scene in CASES.items()}
     with ExitStack() as stack:
 
         def begin(what: str, cells: list[Cell]) -> Running:

@@ -7,20 +7,26 @@ from where Prefect takes it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from typing import Annotated, Any, Literal, Self
+from collections.abc import Callable, Iterable, Mapping
+from functools import wraps
+from inspect import Parameter, Signature, cleandoc
+from types import MappingProxyType
+from typing import Annotated, Any, NamedTuple, Self, TypeVar
 
 import numpy as np
 from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, WithJsonSchema, model_validator
 from shoal.engines import ENGINES
 from shoal.errors import InputError
 from shoal.identification.methods import METHODS
+from shoal.requests import request_of
+from shoal.requests.request import offered, read
 from shoal.trajectory import Array
 from shoal_validation.nightly.plan import IDENTIFICATION
 from shoal_validation.problems import PROBLEMS
 
 from shoal_flows.choices import LIBRARY, MARK, library, names
 from shoal_flows.exports import FORMS
+from shoal_flows.inputs import held
 
 
 def _one_of(names: Iterable[str]) -> Any:
@@ -52,16 +58,8 @@ EngineName = Annotated[str, _one_of(ENGINES)]
 Engines = Annotated[list[EngineName], Field(min_length=2, json_schema_extra={"uniqueItems": True})]
 Methods = Annotated[list[Annotated[str, _one_of(METHODS)]], Field(min_length=1), AfterValidator(_different)]
 Forms = Annotated[list[Annotated[str, _one_of(FORMS)]], Field(min_length=1, json_schema_extra={"uniqueItems": True})]
-Paths = list[str]
 Seeds = Annotated[list[int], Field(min_length=1), AfterValidator(_different)]
 Values = dict[str, Any]
-Instant = Annotated[float | None, Field(ge=0)]
-Time = Annotated[float, Field(ge=0)]
-Length = Annotated[float, Field(ge=0)]
-Count = Annotated[int, Field(ge=0, le=100_000)]
-Tolerance = Annotated[float, Field(gt=0)]
-Size = Annotated[float | None, Field(gt=0)]
-About = Literal["answer", "start"] | None
 ALL = "all"
 Only = Annotated[
     str,
@@ -127,3 +125,67 @@ def _once_each(axes: list[Axis]) -> list[Axis]:
 
 
 Axes = Annotated[list[Axis], BeforeValidator(_axes), Field(min_length=1), AfterValidator(_once_each)]
+
+R = TypeVar("R")
+TYPES: dict[str, Any] = {
+    **{"scene": SceneName, "problem": ProblemName, "data": Data, "engine": EngineName, "engines": Engines | None},
+    **{"set": Values, "vary": Axes, "hold_out": str, "sensor_noise": dict[str, float]},
+}
+"""Types of fields that a form shows otherwise than a function."""
+ABSENT: dict[str, Any] = {"set": {}, "data": "", "hold_out": "", "sensor_noise": {}}
+"""What a form shows for fields that are not stated, where that is not nothing."""
+HELD = {"scene": "scenes", "problem": "problems", "data": "recordings"}
+"""Fields that name entries of the library, by its kinds; a run keeps a copy of each."""
+READ: dict[str, Callable[[Any], Any]] = {
+    "vary": lambda axes: {axis.path: axis.values() for axis in axes},
+    "hold_out": spans,
+}
+"""From what a form holds to the value of a field."""
+
+
+class Own(NamedTuple):
+    """A parameter of a flow that no field of its request states: its type, default and meaning."""
+
+    type: Any
+    default: Any
+    help: str
+
+
+def form(
+    name: str, *, without: tuple[str, ...] = (), own: Mapping[str, Own] = MappingProxyType({}), **defaults: Any
+) -> Callable[[Callable[..., R]], Callable[..., R]]:
+    """Make the function of a flow whose parameters are the fields of a request.
+
+    without: fields that the flow states by parameters of its `own`; defaults: those of the form
+    """
+    kind = request_of(name)
+    shown = {field: one for field, one in offered(kind, "form").items() if field not in without}
+    stated = {
+        field: Own(TYPES.get(field, one.type), defaults.get(field, ABSENT.get(field, one.default)), one.option.help)
+        for field, one in shown.items()
+    } | dict(own)
+
+    parameters = Signature(
+        [
+            Parameter(field, Parameter.POSITIONAL_OR_KEYWORD, default=one.default, annotation=one.type)
+            for field, one in stated.items()
+        ]
+    )
+
+    def made(function: Callable[..., R]) -> Callable[..., R]:
+        @wraps(function)
+        def asked(*args: Any, **kwargs: Any) -> R:
+            given = dict(parameters.bind(*args, **kwargs).arguments)
+            beside = {field: given.pop(field, one.default) for field, one in own.items()}
+            for field in HELD.keys() & given.keys():
+                given[field] = held(field, HELD[field], given[field])
+            filled = {field: value for field, value in given.items() if value not in (None, "") or field in defaults}
+            found = {field: READ.get(field, lambda value: value)(value) for field, value in filled.items()}
+            return function(read(kind, found), **beside)
+
+        meaning = "\n".join(f"    {field}: {one.help}" for field, one in stated.items())
+        asked.__dict__.update(__signature__=parameters, request=kind)
+        asked.__doc__ = f"{cleandoc(function.__doc__ or '')}\n\nArgs:\n{meaning}\n"
+        return asked
+
+    return made

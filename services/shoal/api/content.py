@@ -108,7 +108,7 @@ def _check_source(name: str, source: EngineSource | FileSource, settings: Settin
     if isinstance(source, FileSource):
         if source.path is not None and not ours and shelf().find("recordings", source.path) is None:
             raise InputError(
-                f"problem: recordings.{name}.path: no file is read here; send the numbers in `recordings`, or name a "
+                f"problem: recordings.{name}.path: no file is read here; send the numbers in `data`, or name a "
                 "recording of the library"
             )
         return
@@ -127,12 +127,12 @@ def written(recordings: Mapping[str, Table | str]) -> dict[str, str]:
         if isinstance(table, str):
             known = [entry.name for entry in shelf().entries("recordings")]
             if (entry := shelf().find("recordings", table)) is None:
-                raise InputError(f"recordings.{name}: {unknown(table, 'recording of the library', known)}")
+                raise InputError(f"data.{name}: {unknown(table, 'recording of the library', known)}")
             files[name] = str(entry.document)
             continue
         lengths = {len(column) for column in table.columns.values()}
         if len(lengths) > 1:
-            raise InputError(f"recordings.{name}.columns: all need the same length, found {sorted(lengths)}")
+            raise InputError(f"data.{name}.columns: all need the same length, found {sorted(lengths)}")
         files[name] = f"{name}.csv"
         with Path(files[name]).open("w", encoding="utf-8", newline="") as file:
             rows = csv.writer(file)

@@ -7,17 +7,22 @@ own process knows the requests only; `tasks` computes them.
 from __future__ import annotations
 
 import re
-from typing import Annotated, Any, ClassVar, Literal
+from collections.abc import Callable
+from dataclasses import replace
+from inspect import cleandoc
+from typing import Annotated, Any, ClassVar, Self, TypeVar, get_args
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, ModelWrapValidatorHandler, PrivateAttr, create_model, model_validator
 
 from shoal.api.schemas import Asked, BuiltIn, Fields, Motion, Path, RecordingName, Table
-from shoal.scene.record import limited
+from shoal.arguments import Limit
+from shoal.errors import InputError
+from shoal.requests import request_of
+from shoal.requests.request import Field as FieldOfRequest
+from shoal.requests.request import offered, renamed
 
 Times = list[float]
 Positive = Annotated[float, Field(gt=0)]
-Tolerance = Annotated[float, limited("tolerance")]
-TimeLimit = Annotated[float, limited("time_limit")]
 Some = Annotated[Times, Field(min_length=1)]
 NUMBERS = r"^\s*[a-z-]+\s*\([-+0-9.eE,\s]*\)\s*$"
 Distribution = Annotated[str, Field(max_length=200, pattern=NUMBERS)]
@@ -47,24 +52,77 @@ class Request(Asked):
 
     answer: ClassVar[Any] = dict[str, Any]
     follows: ClassVar[tuple[str, ...]] = ()
+    of: ClassVar[Any] = None
 
     objects: bool = False
+    _notes: list[str] = PrivateAttr(default_factory=list)
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _by_names_of_today(cls, given: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
+        notes = list[str]()
+        if cls.of is not None and isinstance(given, dict):
+            try:
+                given = renamed(cls.of, given, notes.append)
+            except InputError as error:
+                raise ValueError(str(error)) from None
+        found = handler(given)
+        found._notes.extend(notes)
+        return found
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What whoever asked should know beside the answer."""
+        return tuple(self._notes)
 
     def arguments(self) -> dict[str, Any]:
         """Those of the library's function, as far as they are stated, without what names scenes and data."""
-        return self.model_dump(exclude={"objects", "scene", "problem", "recordings", "values"}, exclude_unset=True)
+        beside = {"objects", "scene", "problem", "data", "set", "lanes"}
+        return self.model_dump(exclude=beside, exclude_unset=True)
+
+
+TIGHTER = {"seed": 2**32 - 1, "bootstrap": 10_000, "sample": 100_000}
+"""The largest numbers that this service takes, by field."""
+R = TypeVar("R", bound=Request)
+
+
+def of(name: str) -> Callable[[type[R]], type[R]]:
+    """Give a body the fields of a request, but for those that it states itself."""
+
+    def made(body: type[R]) -> type[R]:
+        kind = request_of(name)
+        stated = {
+            field: (_typed(one), ... if one.required else one.default)
+            for field, one in offered(kind, "http").items()
+            if field not in body.model_fields
+        }
+        about = cleandoc(kind.__doc__ or "")
+        make: Any = create_model
+        found: type[R] = make(body.__name__, __base__=body, __module__=body.__module__, __doc__=about, **stated)
+        found.of = kind
+        return found
+
+    return made
+
+
+def _typed(one: FieldOfRequest) -> Any:
+    kind, limit = one.type, one.limit
+    if limit is not None and one.name in TIGHTER:
+        number: Any = Annotated[int if limit.whole else float, replace(limit, le=TIGHTER[one.name])]
+        kind = number | None if type(None) in get_args(kind) else number
+    return Annotated[kind, Field(description=one.option.help)]
 
 
 class OfScene(Request):
-    """A scene (a name, or an object as /v1/schemas/scene describes it). values: fields of it to set, by path."""
+    """A scene (a name, or an object as /v1/schemas/scene describes it). set: fields of it, by path."""
 
     scene: BuiltIn | dict[str, Any]
-    values: Fields = {}
+    set: Fields = {}
 
     @property
     def instants(self) -> Times | None:
         """When it is looked at [s]; None is its own times."""
-        return getattr(self, "times", None)
+        return getattr(self, "at", None)
 
     @property
     def varied(self) -> dict[str, Times]:
@@ -72,62 +130,50 @@ class OfScene(Request):
         return {}
 
     @property
-    def runs(self) -> int:
-        """Return the number of further runs."""
+    def work(self) -> int:
+        """Return the number of runs, about."""
         return 1
 
 
 class OfProblem(Request):
-    """A problem (a name, or an object as /v1/schemas/problem describes it). values: fields of its scene to set.
+    """A problem (a name, or an object as /v1/schemas/problem describes it). set: fields of its scene.
 
-    The `scene` of a problem is a name, or an object. recordings: by the problem's names, `recording` where it
-    has but one source; each a table, or the name of one in the library. measured: whether none may be missing
+    The `scene` of a problem is a name, or an object. data: by the names of the problem's recordings, `recording` where
+    it has but one source; each a table, or the name of one in the library. measured: whether none may be missing
     """
 
     measured: ClassVar[bool] = False
 
     problem: BuiltIn | dict[str, Any]
-    recordings: dict[RecordingName, Table | BuiltIn] = {}
-    values: Fields = {}
+    data: dict[RecordingName, Table | BuiltIn] = {}
+    set: Fields = {}
 
 
+@of("simulate")
 class Simulate(OfScene):
-    """The motion of a scene, or of one per lane. A run that failed carries its status.
-
-    times: sampling instants [s], else the scene's own; verify: estimate the errors by more careful runs
-    tolerance: error [m] that the markers may have, for which the cheapest model is found
-    lanes: path -> one number per lane; then one scene per lane is simulated
-    """
+    """The motion of a scene, or of one per lane: lanes: path -> one number per lane."""
 
     answer: ClassVar[Any] = Motion
 
-    times: Times | None = None
-    tolerance: Tolerance | None = None
-    verify: bool = True
     lanes: dict[Path, Times] | None = None
 
 
+@of("select")
 class Select(OfScene):
-    """The cheapest model whose estimated error at the markers is below a tolerance [m], with its motion."""
-
-    tolerance: Tolerance
-    times: Times | None = None
+    """The cheapest model within a tolerance."""
 
 
+@of("sweep")
 class Sweep(OfScene):
-    """Marker positions at one instant `time` [s], the scene's end if not stated, over the full grid of `vary`.
-
-    vary: path -> values; verify: estimate the errors at some of its points by more careful runs
-    """
+    """Marker positions at one instant over a grid."""
 
     vary: Annotated[dict[Path, Some], Field(min_length=1)]
-    time: Annotated[float, limited("time")] | None = None
-    verify: bool = True
+    at: Annotated[float, Limit("a time", "s", ge=0)] | None = None
 
     @property
     def instants(self) -> Times | None:
         """When it is looked at [s]; None is its own times."""
-        return None if self.time is None else [self.time]
+        return None if self.at is None else [self.at]
 
     @property
     def varied(self) -> dict[str, Times]:
@@ -135,58 +181,31 @@ class Sweep(OfScene):
         return self.vary
 
 
+@of("uncertain")
 class Uncertain(OfScene):
-    """Bounds and statistics of the markers if fields are intervals or distributions; see `shoal uncertain`.
-
-    vary: path -> [low, high], or a text such as "normal(1, 0.01)"; a bound such as "-2%" is relative to the value of
-    the scene; correlations: [path, path, value] of random ones; times: instants [s], else the scene's own; gap:
-    between outer and attained bounds, as a share of the width, to be reached; tolerance: error [m] of the model
-    verify: estimate mesh and step errors of extremal runs; most: runs that may be made
-    limits: what must not happen, such as "B.y < -1.2"; requirements: what must hold, such as "B.y > -1.2";
-    limit_method, limit_runs: for their probabilities
-    allocate: look for the widest tolerances that keep the limit, with `costs` by path and the `target` probability
-    time_limit: in s, after which it ends with what is known
-    """
+    """Bounds and statistics of the markers."""
 
     follows: ClassVar[tuple[str, ...]] = ("runs",)
 
     vary: Annotated[dict[Path, Uncertainty], Field(min_length=1, max_length=100)]
-    correlations: Annotated[list[tuple[Path, Path, float]], Field(max_length=1000)] = []
-    times: Some | None = None
+    correlate: Annotated[list[tuple[Path, Path, float]], Field(max_length=1000)] = []
     method: BuiltIn = "auto"
-    gap: Annotated[float, limited("gap")] | None = None
-    tolerance: Tolerance | None = None
-    verify: bool = True
-    seed: Annotated[int, limited("seed", le=2**32 - 1)] = 0
-    degree: Annotated[int, limited("degree")] | None = None
-    count: Annotated[int, limited("count")] | None = None
-    most: Annotated[int, limited("most", le=20_000)] = 2_000
-    limits: Annotated[list[Annotated[str, Field(max_length=200)]], Field(max_length=10)] = []
-    requirements: Annotated[list[Annotated[str, Field(max_length=200)]], Field(max_length=10)] = []
+    runs: Annotated[int, Limit("a whole number", ge=3, le=20_000, whole=True)] = 2_000
+    limit: Annotated[list[Annotated[str, Field(max_length=200)]], Field(max_length=10)] = []
+    require: Annotated[list[Annotated[str, Field(max_length=200)]], Field(max_length=10)] = []
     limit_method: BuiltIn = "auto"
-    limit_runs: Annotated[int, limited("limit_runs", le=20_000)] = 5_000
-    allocate: bool = False
-    costs: dict[Path, Positive] | None = None
-    target: Annotated[float, limited("target")] = 1e-3
-    time_limit: TimeLimit | None = None
+    limit_runs: Annotated[int, Limit("a whole number", ge=100, le=20_000, whole=True)] = 5_000
+    cost: dict[Path, Positive] | None = None
 
     @property
-    def runs(self) -> int:
+    def work(self) -> int:
         """Return the number of runs that may be made, about."""
-        return self.most + (len(self.limits) + len(self.requirements) + 4 * self.allocate) * self.limit_runs
-
-    def arguments(self) -> dict[str, Any]:
-        """With correlations as the library has them."""
-        found = super().arguments()
-        if self.correlations:
-            found["correlations"] = {(one, other): value for one, other, value in self.correlations}
-        return found
+        allocated = 4 * bool(getattr(self, "allocate", False))
+        return self.runs + (len(self.limit) + len(self.require) + allocated) * self.limit_runs
 
 
 class AtRest(OfScene):
-    """Base of analyses without a motion. verify: estimate the mesh error by a second run on twice as many elements."""
-
-    verify: bool = True
+    """Base of analyses without a motion."""
 
     @property
     def instants(self) -> Times | None:
@@ -194,78 +213,50 @@ class AtRest(OfScene):
         return [0.0]
 
 
+@of("statics")
 class Statics(AtRest):
-    """Static equilibrium of a scene, with the loads at `time` [s], and its stability."""
-
-    time: Annotated[float, limited("time")] = 0.0
-    tolerance: Tolerance | None = None
+    """Static equilibrium of a scene."""
 
 
+@of("modes")
 class Modes(AtRest):
-    """The `count` lowest eigenfrequencies and their shapes, about the equilibrium or the start.
+    """The lowest eigenfrequencies of a scene and their shapes."""
 
-    speeds: of the body that turns fastest [rad/s], for a Campbell diagram
-    """
-
-    count: Annotated[int, limited("count", le=1000)] = 10
-    about: Literal["equilibrium", "start"] = "equilibrium"
+    count: Annotated[int, Limit("a whole number", ge=1, le=1000, whole=True)] = 10
     speeds: Annotated[list[Annotated[float, Field(ge=0)]], Field(min_length=1, max_length=1000)] | None = None
 
 
+@of("reactions")
 class Reactions(OfScene):
-    """Forces and torques in the joints at `times` [s] of the motion. verify: estimate their errors by more runs."""
-
-    times: Some
-    verify: bool = True
+    """Forces and torques in the joints."""
 
 
+@of("export")
 class Export(OfScene):
-    """A scene as the `text` of a file of another tool, `name`d, and the `distance` [m] between the motions.
-
-    verify: whether it is run there and here
-    """
-
-    to: Literal["exudyn", "mjcf"]
-    verify: bool = True
+    """A scene as the `text` of a file of another tool."""
 
     @property
-    def runs(self) -> int:
+    def work(self) -> int:
         """Here and, to compare, there."""
-        return 2 if self.verify else 1
+        return 2 if getattr(self, "verify", True) else 1
 
 
+@of("identify")
 class Identify(OfProblem):
-    """The parameters of a problem from measured motion; the fields are those of `shoal identify`. time_limit in s.
-
-    hold_out: windows [from, to] [s] that are predicted instead of fitted; by name of several recordings
-    """
+    """The parameters of a problem from measured motion."""
 
     measured: ClassVar[bool] = True
     follows: ClassVar[tuple[str, ...]] = ("iteration", "best", "mean", "evaluations")
 
     method: BuiltIn | None = None
-    seed: Annotated[int, limited("seed", le=2**32 - 1)] = 0
-    tolerance: Tolerance | None = None
-    time_limit: TimeLimit | None = None
-    profiles: bool = False
-    bootstrap: Annotated[int, limited("bootstrap", le=10_000)] = 0
-    sample: Annotated[int, limited("sample", le=100_000)] = 0
     hold_out: list[Window] | dict[RecordingName, list[Window]] | None = None
 
 
+@of("design")
 class Design(OfProblem):
-    """Optimal experiment design for the parameters; the fields are those of `shoal design`.
+    """Optimal experiment design for the parameters."""
 
-    about: `answer`, of an identification, or `start`, which needs no data; noise in m, angle_noise in rad, sensor_noise
-    by what a sensor measures (acceleration, rate, force, torque, strain) in SI units, duration in s, rate in Hz
-    """
-
-    about: Literal["answer", "start"] | None = None
-    noise: Positive | None = None
-    angle_noise: Positive | None = None
     sensor_noise: dict[str, Positive] | None = None
-    duration: Positive | None = None
-    rate: Positive | None = None
     parameter: BuiltIn | None = None
 
 

@@ -99,13 +99,18 @@ async def schema(kind: Literal["scene", "problem"], calls: Calls) -> dict[str, A
     return found
 
 
+def _noted(asked: Operation) -> dict[str, str]:
+    """The header that says in one line what whoever asked should know beside the answer; none if there is nothing."""
+    return {"Warning": f'299 shoal "{"; ".join(asked.notes)}"'} if asked.notes else {}
+
+
 def _answering(name: str, kind: type[Operation]) -> None:
     """The endpoints of an operation: at once, and as a job."""
 
     async def now(asked: Operation, request: Request, calls: Calls) -> Response:
         seconds = request.app.state.settings.wall_seconds
         answer = await calls.run("call", (name, asked), seconds, gone=request.is_disconnected)
-        return Response(answer, media_type="application/json")
+        return Response(answer, headers=_noted(asked), media_type="application/json")
 
     async def later(
         asked: Operation, request: Request, response: Response, calls: Calls, jobs: AllJobs, key: Key = None
@@ -113,7 +118,7 @@ def _answering(name: str, kind: type[Operation]) -> None:
         seconds = request.app.state.settings.wall_seconds
         await calls.run("check", (name, asked), seconds, gone=request.is_disconnected)
         job = jobs.submit(name, asked, key)
-        response.headers["Location"] = f"{JOBS}/{job.id}"
+        response.headers.update({"Location": f"{JOBS}/{job.id}", **_noted(asked)})
         return job.status
 
     for function, what in ((now, name), (later, f"{name}-job")):

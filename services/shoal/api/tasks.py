@@ -17,7 +17,7 @@ from shoal.api.content import problem_of, scene_of, written
 from shoal.api.limits import check_end, check_grid, check_lanes, check_scene, within
 from shoal.api.operations import OfProblem, OfScene, Request, Simulate
 from shoal.api.settings import Settings
-from shoal.arguments import check_apart, check_estimated
+from shoal.arguments import check_apart
 from shoal.engines.contract import Engine
 from shoal.engines.spot_checks import spot_check
 from shoal.engines.verification import verified
@@ -25,6 +25,7 @@ from shoal.errors import InputError
 from shoal.identification.methods import get_method
 from shoal.identification.recording.source import FileSource
 from shoal.mechanics.analysis.joint_reactions import to_json as reactions_to_json
+from shoal.requests.request import read
 from shoal.scene import Scene
 from shoal.trajectory import Trajectory, plain
 from shoal.wire import packed
@@ -75,13 +76,13 @@ def _prepared(bench: Bench, asked: Call) -> Computation:
 
 def _of_scene(bench: Bench, request: OfScene) -> tuple[Scene, Scene]:
     """The scene of a request, and the same with no more steps than the service computes. Raises InputError."""
-    scene, settings = scene_of(request.scene, request.values), bench.settings
+    scene, settings = scene_of(request.scene, request.set), bench.settings
     lanes = request.lanes if isinstance(request, Simulate) else None
-    check_apart(request.values, lanes or request.varied)
+    check_apart(request.set, lanes or request.varied)
     if lanes is None:
         check_grid(scene, settings, request.instants, request.varied)
-        check_scene(scene, settings, request.instants, request.runs)
-        count = request.runs * math.prod(len(axis) for axis in request.varied.values())
+        check_scene(scene, settings, request.instants, request.work)
+        count = request.work * math.prod(len(axis) for axis in request.varied.values())
     else:
         if getattr(request, "tolerance", None) is not None:
             raise InputError("tolerance: a model is chosen for one scene; leave `lanes` out")
@@ -91,16 +92,16 @@ def _of_scene(bench: Bench, request: OfScene) -> tuple[Scene, Scene]:
 
 
 def _of_problem(bench: Bench, request: OfProblem) -> dict[str, Any]:
-    problem = problem_of(request.problem, bench.settings, request.values)
+    problem = problem_of(request.problem, bench.settings, request.set)
     if (method := getattr(request, "method", None)) is not None or request.measured:
         get_method(method or problem.method)
-    for name in request.recordings:
+    for name in request.data:
         if name not in problem.sources:
-            raise InputError(f"recordings: no recording {name!r}; there are {', '.join(problem.sources)}")
+            raise InputError(f"data: no recording {name!r}; there are {', '.join(problem.sources)}")
     for name, source in problem.sources.items() if request.measured else ():
-        if isinstance(source, FileSource) and source.path is None and name not in request.recordings:
-            raise InputError(f"recordings: {name!r} is missing; this problem is fitted to measured motion")
-    return {"problem": problem, "data": written(request.recordings) or None, "values": request.values}
+        if isinstance(source, FileSource) and source.path is None and name not in request.data:
+            raise InputError(f"data: {name!r} is missing; this problem is fitted to measured motion")
+    return {"problem": problem, "data": written(request.data) or None, "set": request.set}
 
 
 def _computed(bench: Bench, name: str, arguments: dict[str, Any], request: Request, note: Note) -> bytes:
@@ -124,17 +125,18 @@ def told(found: Any) -> Any:
 
 def _simulated(bench: Bench, request: Simulate, scene: Scene, bounded: bool, note: Note) -> bytes:
     """The motion of a scene, or of one per lane. bounded: whether it takes as many steps as the service computes."""
-    times, engine = request.times, bench.engine
-    check_estimated(request.tolerance, request.verify)
-    if request.tolerance is not None:
-        selection = notebook.select(scene, request.tolerance, times)
-        return _motion(request, selection.trajectory, selection.to_json())
+    asked, engine = read(request.of, {"scene": scene, **request.arguments()}), bench.engine
+    times = request.instants
+    if asked.tolerance is not None:
+        found, _, selection = notebook.motion(asked, scene)
+        assert selection is not None
+        return _motion(request, found, selection.to_json())
     if request.lanes is None:
-        found = verified(engine, scene, times) if request.verify else engine.simulate(scene, times)
+        found = verified(engine, scene, times) if asked.verify else engine.simulate(scene, times)
     else:
         values = {path: np.array(numbers) for path, numbers in request.lanes.items()}
         found = engine.simulate_many(scene, values, times)
-        if request.verify:
+        if asked.verify:
             checked = spot_check(engine, scene, values, found.status, found.times)
             model = {**found.model, "errors": checked.errors.to_json(), "verification": checked.to_json()}
             found = replace(found, model=model, message=found.message or checked.complaint)

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from shoal.commands import options
-from shoal.commands.options import Out, Values
+from shoal.commands.command import command
+from shoal.commands.options import Out
 from shoal.errors import check_trusted
 from shoal.ports import PORTS
+
+if TYPE_CHECKING:
+    from shoal.requests.export import Export
+    from shoal.requests.fmu import Fmu
 
 
 @click.command()
@@ -30,64 +37,36 @@ def serve(engine: str, host: str, port: int | None, certificate: Path | None, ke
     serve(engine, host, port, certificate, key)
 
 
-@click.command("export-fmu")
-@click.argument("scene")
-@options.values
-@click.option(
-    "--parameter",
-    "parameters",
-    multiple=True,
-    metavar="PATH",
-    help="A number of the scene that a host may set (repeatable); else gravity and the stated initial angles.",
-)
-@click.option(
-    "--input",
-    "inputs",
-    multiple=True,
-    metavar="PATH",
-    help="A load's scale or torque, or a drive, that a host may change during the run (repeatable).",
-)
-@click.option("--fmi", type=click.Choice(["2", "3"]), default="2", show_default=True, help="Version: 2.0 or 3.0.")
+@command("fmu", name="export-fmu")
 @options.out(".fmu", otherwise="; else the scene's name")
-def export_fmu(
-    scene: str, values: Values, parameters: tuple[str, ...], inputs: tuple[str, ...], fmi: str, out: Out
-) -> None:
+def export_fmu(asked: Fmu, out: Out) -> None:
     """Write SCENE as an FMI unit for co-simulation. A host needs this installation to run it."""
     from shoal.fmu.export import export
-    from shoal.scene import load_scene
+    from shoal.notebook import machine
     from shoal.terminal import screen
 
-    wanted = load_scene(scene).with_values(values)
-    with screen.working(f"exporting {wanted.name}"):
-        screen.compile_for("gauss", [1], wanted)
-        written = export(wanted, parameters, out, inputs=inputs, fmi=fmi)
+    scene = machine(asked, options.note)
+    with screen.working(f"exporting {scene.name}"):
+        screen.compile_for("gauss", [1], scene)
+        written = export(scene, asked.parameter, out, inputs=asked.input, fmi=asked.fmi)
     click.echo(written)
 
 
-@click.command()
-@click.argument("scene")
-@click.option(
-    "--to",
-    required=True,
-    type=click.Choice(["exudyn", "mjcf"]),
-    help="exudyn: a Python script that runs by itself; mjcf: MuJoCo's format, of rigid bodies.",
-)
-@options.values
-@click.option("--verify/--no-verify", default=True, show_default=True, help="Run it there and here, and compare.")
+@command("export")
 @options.out(".py", ".xml", otherwise="; else the scene's name")
-def export(scene: str, to: str, values: Values, verify: bool, out: Out) -> None:
+def export(asked: Export, out: Out) -> None:
     """Write SCENE as a file of another tool. The distance of its motion from ours is printed on stderr."""
-    from shoal.exported import checked, export
-    from shoal.scene import load_scene
+    from shoal.notebook import export, machine
     from shoal.terminal import screen
 
-    wanted = load_scene(scene).with_values(values)
-    with screen.working(f"exporting {wanted.name}"):
-        done = export(wanted, checked(to, out), verify=verify)
-    out = out or Path(done.name)
-    done.save(out)
+    scene = machine(asked, options.note)
+    with screen.working(f"exporting {scene.name}"):
+        done = export.answer(replace(asked.of(scene), file=out))
+    if out is None:
+        out = Path(done.name)
+        done.save(out)
     if done.distance is not None:
-        click.echo(f"{to}: its motion is within {done.distance:.2g} m of `shoal simulate`", err=True)
+        click.echo(f"{asked.to}: its motion is within {done.distance:.2g} m of `shoal simulate`", err=True)
     click.echo(out)
 
 

@@ -88,7 +88,7 @@ class RemoteEngine:
     ) -> Trajectory:
         request = {
             "scene": scene.model_dump(mode="json"),
-            "times": None if times is None else numbers("times", times, "times in s").tolist(),
+            "at": None if times is None else numbers("times", times, "times in s").tolist(),
             "lanes": lanes,
             "verify": False,
         }

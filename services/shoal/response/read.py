@@ -13,7 +13,7 @@ from scipy import stats
 
 from shoal.errors import InputError
 from shoal.regular import require_regular
-from shoal.response.inputs import Correlations, Parameter
+from shoal.response.inputs import Parameter
 from shoal.response.marginals import Empirical, Frozen, Interval, Marginal, Normal, Uniform
 from shoal.response.posterior import from_posterior, is_source
 from shoal.response.salib import from_salib, is_problem
@@ -94,42 +94,6 @@ def by_name(vary: Mapping[str, Any] | Sequence[str]) -> dict[str, Any]:
         if sum(other == name for other, _ in found) > 1:
             raise InputError(f"vary: {name} is varied twice")
     return dict(found)
-
-
-def correlations(pairs: Sequence[str]) -> Correlations | None:
-    """PATH,PATH=VALUE texts. Raises InputError."""
-    found: dict[tuple[str, str], float] = {}
-    for text in pairs:
-        names, _, value = text.rpartition("=")
-        one, comma, other = names.partition(",")
-        try:
-            known = float(value)
-        except ValueError:
-            comma = ""
-        if not comma:
-            raise InputError(f"correlate: {text!r} is not PATH,PATH=VALUE, such as bodies.A.length,bodies.B.length=0.8")
-        pair = one.strip(), other.strip()
-        if pair in found or pair[::-1] in found:
-            raise InputError(f"correlate: {', '.join(pair)}: is given twice")
-        found[pair] = known
-    return found or None
-
-
-def prices(texts: Sequence[str]) -> dict[str, float]:
-    """PATH=COST texts. Raises InputError."""
-    found: dict[str, float] = {}
-    for text in texts:
-        name, _, cost = text.rpartition("=")
-        try:
-            known = float(cost)
-        except ValueError:
-            name = ""
-        if not name:
-            raise InputError(f"cost: {text!r} is not PATH=COST, such as bodies.OA.length=2.5")
-        if (name := name.strip()) in found:
-            raise InputError(f"cost: {name} is given twice")
-        found[name] = known
-    return found
 
 
 def _split(text: str) -> tuple[str, Any]:

@@ -5,14 +5,13 @@ from __future__ import annotations
 import hashlib
 import math
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from shoal.arguments import check
 from shoal.compile import clock
 from shoal.engines import get_engine
 from shoal.engines.contract import sampling_times
@@ -20,6 +19,7 @@ from shoal.engines.starts import Stated, Tally
 from shoal.errors import ComputationError, InputError
 from shoal.mechanics import reach
 from shoal.memory import Memory
+from shoal.requests.uncertain import Uncertain
 from shoal.response.allocation import (
     TARGET,
     Allocation,
@@ -33,9 +33,8 @@ from shoal.response.attained import DRAWN
 from shoal.response.between import between
 from shoal.response.boxes import HOPELESS
 from shoal.response.finer import repeated
-from shoal.response.inputs import Correlations, Inputs, Parameter
+from shoal.response.inputs import Inputs
 from shoal.response.kept import Keep, TimeIsUpError
-from shoal.response.limits import MOST as LIMIT_RUNS
 from shoal.response.limits import Judged, judge, read_limits
 from shoal.response.limits.choice import get_way
 from shoal.response.limits.crosschecked import allowing, crosschecked
@@ -45,11 +44,10 @@ from shoal.response.limits.quantities import of_section
 from shoal.response.machine import Machine
 from shoal.response.model_errors import model_errors, unestimated
 from shoal.response.read import parameters
-from shoal.response.respond import MOST, Answer, respond
+from shoal.response.respond import Answer, respond
 from shoal.response.result import Bounds, Response
 from shoal.response.runs import Model
 from shoal.scene import Scene
-from shoal.scene.load import as_scene
 from shoal.trajectory import Array
 from shoal.versions import versions
 
@@ -63,73 +61,26 @@ NAMED = 3
 """Of what missed the gap asked for, in the message."""
 
 
-def uncertain(
-    scene: Scene | Mapping[str, Any] | str | Path,
-    vary: Mapping[str, Any] | Sequence[str | Parameter],
-    times: Sequence[float] | Array | None = None,
-    *,
-    values: Mapping[str, Any] | None = None,
-    method: str = "auto",
-    gap: float | None = None,
-    correlations: Correlations | None = None,
-    degree: int | None = None,
-    count: int | None = None,
-    tolerance: float | None = None,
-    engine: str = "gauss",
-    verify: bool = True,
-    seed: int = 0,
-    most: int = MOST,
-    limits: Sequence[str] = (),
-    requirements: Sequence[str] = (),
-    limit_method: str = "auto",
-    limit_runs: int = LIMIT_RUNS,
-    allocate: bool = False,
-    costs: Mapping[str, float] | None = None,
-    target: float | None = None,
-    checkpoint: Path | str | None = None,
-    time_limit: float | None = None,
-    progress: Callable[[int], None] | None = None,
-) -> Response:
+def uncertain(asked: Uncertain, scene: Scene) -> Response:
     """How the markers of a scene may move if some of its fields are known as intervals or distributions only.
 
-    vary: path -> (low, high), a text such as "normal(1, 0.01)" or a frozen distribution of scipy, or a list of what
-    `--vary` takes; times: instants [s], else the scene's own; method: one of `METHODS`; gap: between outer and attained
-    bounds, as a share of the largest width, that must be reached; correlations: of pairs of random parameters;
-    degree, count: of a method that has one; tolerance: error [m] that the markers of the middle machine may have, for
-    which the cheapest model is found (runs that attain bounds are then repeated on a finer mesh); verify: estimate mesh
-    and step errors of extremal runs; most: runs that may be made; limits: what must not happen, such as "B.y < -1.2";
-    requirements: what must hold, such as "B.y > -1.2"; limit_method: one of `WAYS`; limit_runs: for each of them;
-    allocate: look for the widest tolerances that keep the limit, with `costs` (by path, else 1) of tightening each;
-    target: probability of passing it that is allowed, else `TARGET`; checkpoint: file that keeps the runs, from which
-    the same study goes on; time_limit [s]: after which, compiling aside, it ends with what is known; progress: is told
-    how many runs there are. Raises InputError, ComputationError.
+    scene: that of the request, with its fields set. Raises InputError, ComputationError.
     """
     begin = clock.now()
-    check(gap=gap, degree=degree, count=count, tolerance=tolerance, seed=seed, most=most)
-    check(limit_runs=limit_runs, target=target, time_limit=time_limit)
-    for name, given in {"costs": costs, "target": target}.items():
-        if given and not allocate:
-            raise InputError(f"{name}: belongs to allocate, the search for the widest tolerances; ask for that too")
-    for name, stated in {"limit_method": limit_method != "auto", "limit_runs": limit_runs != LIMIT_RUNS}.items():
-        if stated and not limits and not requirements:
-            raise InputError(f"{name}: belongs to a limit, whose probability it is for; state one, such as B.y < -1.2")
-    end = None if time_limit is None else clock.now() + time_limit
-    wanted = as_scene(scene)
-    wanted = wanted.with_values(values) if values else wanted
-    inputs = Inputs(parameters(vary, wanted), correlations)
+    end = None if asked.time_limit is None else clock.now() + asked.time_limit
+    wanted = scene
+    inputs = Inputs(parameters(asked.vary, wanted), asked.correlate or None)
     starts = Tally(Stated.of(wanted, [path for one in inputs.parameters for path in one.factors]))
-    get_way(limit_method)
+    get_way(asked.limit_method)
     # The start is stated, not a response: of the scene's own instants those after it count.
-    when = sampling_times(wanted, times) if times is not None else sampling_times(wanted, None)[1:]
-    asked = read_limits(limits, requirements, wanted)
-    if allocate and len(asked) != 1:
-        raise InputError(f"allocate: needs one limit, found {len(asked)}; state it with --require or --limit")
-    costs_of(costs or {}, inputs)
-    if tolerance is not None:
-        wanted = _modelled(wanted, inputs, tolerance, when, engine, asked)
-    keep = _keep(wanted, when, engine, checkpoint, end)
-    machine = Machine(wanted, when, get_engine(engine), keep=keep, starts=starts)
-    for one in asked:
+    when = sampling_times(wanted, asked.at) if asked.at is not None else sampling_times(wanted, None)[1:]
+    conditions = read_limits(asked.limit, asked.require, wanted)
+    costs_of(asked.cost or {}, inputs)
+    if asked.tolerance is not None:
+        wanted = _modelled(wanted, inputs, asked.tolerance, when, asked.engine, conditions)
+    keep = _keep(wanted, when, asked.engine, asked.checkpoint, end)
+    machine = Machine(wanted, when, get_engine(asked.engine), keep=keep, starts=starts)
+    for one in conditions:
         require(machine, one, inputs)
     count_t, count_m, count_q = machine.columns
     try:
@@ -137,15 +88,15 @@ def uncertain(
             machine,
             inputs,
             count_t * count_m * count_q,
-            method=method,
+            method=asked.method,
             groups=np.tile(np.arange(count_m * count_q), count_t),
             instants=np.repeat(when, count_m * count_q),
-            gap=gap,
-            degree=degree,
-            count=count,
-            seed=seed,
-            most=most,
-            progress=progress,
+            gap=asked.gap,
+            degree=asked.degree,
+            count=asked.count,
+            seed=asked.seed,
+            most=asked.runs,
+            progress=asked.progress,
             over_time=lambda instants: replace(machine, times=instants, keep=None),
         )
     except TimeIsUpError:
@@ -154,25 +105,27 @@ def uncertain(
     if bounds is not None and math.isfinite(answer.horizon):
         bounds = _beyond(wanted, inputs, bounds, machine)
     known = (
-        model_errors(machine, answer.runs, _deciding(answer, seed))
-        if verify and not keep.over
+        model_errors(machine, answer.runs, _deciding(answer, asked.seed))
+        if asked.verify and not keep.over
         else unestimated(machine)
     )
     bounds = None if bounds is None else known.of_bounds(bounds)
     judged, allocation, finer = list[Judged](), None, None
     try:
-        if tolerance is not None and bounds is not None and verify and not keep.over:
+        if asked.tolerance is not None and bounds is not None and asked.verify and not keep.over:
             finer = repeated(machine, answer.runs)
-        how = dict[str, Any](way=limit_method, most=limit_runs, seed=seed, verify=verify, progress=progress)
-        for passed in asked:
+        same = {name: getattr(asked, name) for name in ("seed", "verify", "progress")}
+        how = {"way": asked.limit_method, "most": asked.limit_runs, **same}
+        for passed in conditions:
             if inputs.mixed:
                 judged.append(between(passed, machine, inputs, **how))
             else:
-                found = judge(passed, machine, inputs, _reach(inputs, when, gap, seed, most), **how)
+                found = judge(passed, machine, inputs, _reach(inputs, when, asked.gap, asked.seed, asked.runs), **how)
                 shared = answer.found.indices is not None
                 judged.append(crosschecked(found, machine, answer.drawn, shared=shared))
-        if allocate:
-            allocation = _allocated(judged[0], machine, costs or {}, TARGET if target is None else target, most, how)
+        if asked.allocate:
+            target = TARGET if asked.target is None else asked.target
+            allocation = _allocated(judged[0], machine, asked.cost or {}, target, asked.runs, how)
     except TimeIsUpError:
         pass
     finally:
@@ -184,17 +137,17 @@ def uncertain(
         if statistics is not None and told.passing is not None and not told.doubt:
             statistics, lack = allowing(statistics, machine, told.limit, told.passing.estimate)
             lacks += [lack] if lack else []
-    status, message = _status(answer, gap, known.rejected, judged)
+    status, message = _status(answer, asked.gap, known.rejected, judged)
     message = "; ".join([message] * bool(message) + lacks)
     if status in REFUSED:
         judged = [replace(told, kept=None) if told.kept else told for told in judged]
     if keep.over:
-        missing = [one.text for one in asked[len(judged) :]]
+        missing = [one.text for one in conditions[len(judged) :]]
         status, message = (
             "time-limit",
-            f"the {time_limit:g} s were over"
+            f"the {asked.time_limit:g} s were over"
             + (f"; nothing is known of {', '.join(missing)}" if missing else "")
-            + ("; the same again goes on from here" if checkpoint else ""),
+            + ("; the same again goes on from here" if asked.checkpoint else ""),
         )
     if status == "ok" and allocation is not None and not allocation.ok:
         status, message = "allocation-not-met", allocation.message
@@ -202,7 +155,7 @@ def uncertain(
         status=status,
         message=message,
         scene=wanted.name,
-        method=method,
+        method=asked.method,
         why=answer.found.why,
         inputs=inputs,
         times=when,
@@ -211,7 +164,7 @@ def uncertain(
         evaluations=answer.runs.evaluations,
         repeated=answer.runs.repeated,
         failed=answer.runs.failed,
-        seed=seed,
+        seed=asked.seed,
         wall_s=clock.now() - begin,
         horizon=min(answer.horizon, float(when[-1])),
         bounds=bounds,
@@ -219,7 +172,7 @@ def uncertain(
         errors=known.budget,
         model=known.columns,
         stated=wanted,
-        engine=engine,
+        engine=asked.engine,
         limits=tuple(judged),
         allocation=allocation,
         boxes=boxes,
@@ -227,8 +180,8 @@ def uncertain(
         controls=answer.runs.controls,
         elsewhere=starts.elsewhere,
     )
-    if status == "gap-not-reached" and bounds is not None and gap is not None:
-        response = replace(response, message=message + _named(response.missed(gap)))
+    if status == "gap-not-reached" and bounds is not None and asked.gap is not None:
+        response = replace(response, message=message + _named(response.missed(asked.gap)))
     return response
 
 

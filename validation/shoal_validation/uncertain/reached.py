@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from shoal.engines import get_engine
 from shoal.engines.ways import on_finer_mesh
-from shoal.response import Response, respond, uncertain
+from shoal.notebook import uncertain
+from shoal.response import Response, respond
 from shoal.response.inputs import Inputs, Parameter
 from shoal.response.machine import Machine
 from shoal.response.marginals import Normal, Uniform
@@ -229,7 +230,7 @@ def statistics() -> Reached:
     scene = load_scene(PENDULUM)
     ways = [f"{path}~normal({scene.value(path)},{NORMAL[path] * scene.value(path)})" for path in FIELDS]
     found = uncertain(scene, ways, verify=False)
-    judge = uncertain(scene, ways, method="sobol", count=JUDGING, most=JUDGING, seed=7, verify=False)
+    judge = uncertain(scene, ways, method="sobol", count=JUDGING, runs=JUDGING, seed=7, verify=False)
     one, other = found.statistics, judge.statistics
     assert one is not None
     assert other is not None

@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 from shoal.engines import get_engine
-from shoal.response import Response, uncertain
+from shoal.notebook import uncertain
+from shoal.response import Response
 from shoal.scene import Scene, load_scene
 from shoal.trajectory import Array, Status
 
