@@ -86,18 +86,18 @@ def driven(constraints: Constraints, drives: Functions, k: int, t: float, order:
     if number < 0:
         return 0.0
     if way == LINEAR:
-        return -functions.evaluate(drives, number, t, order)
+        return -functions.evaluate(drives, number, t, order)  # type: ignore[no-any-return]
     p = functions.evaluate(drives, number, t, 0)
     if order == 0:
-        return by_drive(way, p, 0)
+        return by_drive(way, p, 0)  # type: ignore[no-any-return]
     rate = functions.evaluate(drives, number, t, 1)
     if order == 1:
-        return by_drive(way, p, 1) * rate
+        return by_drive(way, p, 1) * rate  # type: ignore[no-any-return]
     change = functions.evaluate(drives, number, t, 2)
     if order == 2:
-        return by_drive(way, p, 2) * rate**2 + by_drive(way, p, 1) * change
+        return by_drive(way, p, 2) * rate**2 + by_drive(way, p, 1) * change  # type: ignore[no-any-return]
     jerk = functions.evaluate(drives, number, t, 3)
-    return by_drive(way, p, 3) * rate**3 + 3.0 * by_drive(way, p, 2) * rate * change + by_drive(way, p, 1) * jerk
+    return by_drive(way, p, 3) * rate**3 + 3.0 * by_drive(way, p, 2) * rate * change + by_drive(way, p, 1) * jerk  # type: ignore[no-any-return]
 
 
 @njit(cache=True, error_model="numpy")
@@ -107,7 +107,7 @@ def curvature(constraints: Constraints, drives: Functions, k: int, t: float, one
     if number < 0:
         return 0.0
     bend = by_drive(constraints.way[k], functions.evaluate(drives, number, t, 0), 2)
-    return bend * functions.evaluate(drives, number, t, one) * functions.evaluate(drives, number, t, other)
+    return bend * functions.evaluate(drives, number, t, one) * functions.evaluate(drives, number, t, other)  # type: ignore[no-any-return]
 
 
 @njit(cache=True, error_model="numpy")

@@ -137,7 +137,8 @@ class Limits:
         if farthest > reach:
             return Status.OUT_OF_REACH, f"a marker is {farthest:.3g} m away, the reach is {reach:.3g} m"
         if energy_drift > allowed:
-            return Status.ENERGY, f"energy is off by {energy_drift:.2g}, allowed {allowed:g} (relative)"
+            advice = "" if adaptive else "; use a smaller step"
+            return Status.ENERGY, f"energy is off by {energy_drift:.2g}, allowed {allowed:g} (relative){advice}"
         if not constraint_drift <= OPEN:
             return Status.DRIFTED, self._open(numbers)
         return Status.OK, ""

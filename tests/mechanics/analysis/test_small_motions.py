@@ -116,8 +116,10 @@ def test_a_pendulum_beside_a_stiff_rod_is_held() -> None:
 
 def test_a_pendulum_standing_beside_a_stiff_rod_is_unstable() -> None:
     assert statics(_beside(UP), leave_unstable=False).status is Held.UNSTABLE
-    (mode,) = modes(_beside(UP), about="start", count=1).modes
+    found = modes(_beside(UP), about="start", count=1)
+    (mode,) = found.modes
     assert mode.kind == "unstable"
+    assert found.verdict[1] == "it does not stay there: a motion of B grows with exp(t * 3.131/s)"
     assert mode.eigenvalue.real == pytest.approx(np.sqrt(G / 1.001), rel=1e-9)
 
 

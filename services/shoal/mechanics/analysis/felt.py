@@ -130,8 +130,8 @@ def lanes_of(states: States, times: Array, lanes: list[int]) -> Iterator[Felt]:
     """Lanes of a motion whose states are known, on its model."""
     model = states.model
     if model.slowed:  # what moves more slowly than it would is felt as it would move
-        begun = {"q0": model.q0, "v0": model.v0, "start_angles": model.start_angles}
-        model = replace(build(model.stated, model.lanes, float(times[-1])), **begun)
+        free = build(model.stated, model.lanes, float(times[-1]))
+        model = replace(free, q0=model.q0, v0=model.v0, start_angles=model.start_angles)
     for lane in lanes:
         yield _quantities(Evaluator(model, lane), states, times, lane, lane)
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from shoal.mechanics.affine import points
 from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.frames import PointFrame, RigidFrame
-from shoal.mechanics.numerics.tile import Array
 
 SHARE = 0.1
 """Bodies that move by less than this part of the farthest motion are not named."""
@@ -17,7 +17,7 @@ MOST = 4
 """Bodies named at most."""
 
 
-def movers(placement: Placement, size: float, displacement: Array) -> str:
+def movers(placement: Placement, size: float, displacement: npt.NDArray[Any]) -> str:
     """Name the bodies that a displacement of the coordinates, (unknowns,), moves, the one that moves most first.
 
     size: of the machine [m]; a turn of 1 rad counts as much. The displacement may be complex.

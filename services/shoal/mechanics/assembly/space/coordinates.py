@@ -15,7 +15,7 @@ from shoal.mechanics.assembly.space.axes import joint_axes
 from shoal.mechanics.assembly.space.body_vectors import AttitudeVectors
 from shoal.mechanics.assembly.space.sections import chosen_elements
 from shoal.mechanics.frames import BeamFrame, RigidFrame
-from shoal.mechanics.joints import Aligned, Along, Hinged, Meet, Square, Turned
+from shoal.mechanics.joints import Aligned, Along, Hinged, Meet, Square, Turned, of_scene
 from shoal.mechanics.numerics.tile import Array
 from shoal.scene import GROUND, Attachment, Scene
 
@@ -55,6 +55,15 @@ class SpatialPlacement(AttitudeVectors, Placement):
         flat, towards, ahead = self.hinge(condition.first, condition.second, condition.axis)
         self.terms.dot(name, flat, towards, 0, drive=condition.angle.through("cos", "neg"))
         self.terms.dot(name, ahead, towards, 0, drive=condition.angle.through("sin", "neg"))
+
+    def is_turned_by_ground(self, body: str) -> bool:
+        """Return whether a drive turns a body against the ground: its cosine and sine then keep the length."""
+        root, _ = self.attitudes.kept.root(body)
+        return any(
+            {root, GROUND} == {self.attitudes.kept.root(side.body)[0] for side in (one.first, one.second)}
+            for _, one in of_scene(self.scene)
+            if isinstance(one, Hinged)
+        )
 
     def shares(self, condition: Any, is_weld: bool) -> bool:
         """Return whether the coordinates satisfy a condition by themselves, or further terms hold it."""

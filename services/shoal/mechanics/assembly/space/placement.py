@@ -209,7 +209,7 @@ class _DirectorVectors:
             start, rate = arm(self.pose.directors, tuple(first_image)), arm(self.pose.turning, tuple(first_image))
             one, other = turns.across(normal)
             first = result.new_along(0.0 * one, one, start, rate) + result.new_along(0.0 * other, other, start, rate)
-        if first.terms:
+        if first.terms and not result.is_turned_by_ground(name):
             result.terms.dot(name, first, first, 0, -1.0)
         basis = [first, first.turned(quarter), fixed(normal)]
         images = np.stack(np.broadcast_arrays(first_image, turns.cross(image, first_image), image))
