@@ -137,7 +137,7 @@ def _written(kind: Any, metadata: Any = ()) -> str:
         text = ", ".join(f"`{one}`" for one in parts)
     elif origin is tuple:
         count = "" if parts[-1] is ... else f"{len(parts)} "
-        text = f"list of {count}{_written(parts[0]).replace('number', 'numbers', 1)}"
+        text = f"list of {count}" + re.sub(r"\bnumber\b", "numbers", _written(parts[0]))
     elif origin is dict:
         text = "by name: " + _written(parts[1])
     elif parts:

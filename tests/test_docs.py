@@ -22,6 +22,7 @@ from shoal import swarm
 from shoal.cli import main
 from shoal.engines import ENGINES, get_engine
 from shoal.identification import METHODS, methods
+from shoal.identification.findings import Verdict
 from shoal_flows.deployment import processes, up
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -81,6 +82,13 @@ def test_kinds_without_a_second_engine_are_those_that_the_page_names() -> None:
     (named,) = re.findall(r"The kinds (.*) have no second engine", (DOCS / "validation.md").read_text(encoding="utf-8"))
     ours, *others = (set().union(*kinds(name)) for name in ("gauss", *(set(ENGINES) - {"gauss"})))
     assert set(re.findall(r"`([a-z-]+)`", named)) == ours.difference(*others)
+
+
+def test_the_page_on_judging_names_every_verdict_in_its_order() -> None:
+    (table,) = re.findall(
+        r"^\| verdict \| when \|\n.*\n((?:\|.*\n)+)", (DOCS / "judge.md").read_text(encoding="utf-8"), re.M
+    )
+    assert [row.split("|")[1].strip() for row in table.splitlines()] == [verdict.value for verdict in Verdict]
 
 
 def kinds(engine: str) -> tuple[frozenset[str], ...]:
