@@ -1,6 +1,6 @@
 """Limits of arguments: numbers and lists of numbers, as library, command line and services check them.
 
-Command line and services read `LIMITS`, so that help and schemas agree; functions of the library call `check`.
+The fields of requests state theirs as `Limit`, from which help, messages and schemas follow; others call `check`.
 """
 
 from __future__ import annotations
@@ -80,13 +80,8 @@ _HOLDS = {
 LIMITS = {
     "bootstrap": Limit("a whole number", ge=0, whole=True),
     "count": Limit("a whole number", ge=1, whole=True),
-    "degree": Limit("a whole number", ge=1, le=40, whole=True),
-    "gap": Limit("a share", gt=0, le=1),
-    "limit_runs": Limit("a whole number", ge=100, whole=True),
-    "most": Limit("a whole number", ge=3, whole=True),
     "sample": Limit("a whole number", ge=0, whole=True),
     "seed": Limit("a whole number", ge=0, whole=True),
-    "target": Limit("a probability", gt=0, lt=0.5),
     "time": Limit("a time", "s", ge=0),
     "time_limit": Limit("a time", "s", gt=0),
     "tolerance": Limit("a length", "m", gt=0),
@@ -99,14 +94,6 @@ def check(**given: Any) -> None:
     for name, value in given.items():
         if value is not None and not LIMITS[name].holds(value):
             raise InputError(f"{name}: needs {LIMITS[name]}, found {told(value)}")
-
-
-def check_estimated(tolerance: float | None, verify: bool) -> None:
-    """Raises InputError where a tolerance is to be kept of which no estimate may be made."""
-    if tolerance is not None and not verify:
-        raise InputError(
-            "verify: a tolerance is kept by estimates of the error; leave it out, or do not turn verify off"
-        )
 
 
 def check_apart(values: Any, varied: Iterable[str]) -> None:

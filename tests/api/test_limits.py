@@ -15,7 +15,7 @@ from shoal.engines import get_engine
 
 def ask(work: int, **values: Any) -> dict[str, Any]:
     """Ten seconds of a pendulum by a service that computes so much."""
-    request = Simulate(scene="single-pendulum", times=[10.0], values={f"solver.{k}": v for k, v in values.items()})
+    request = Simulate(scene="single-pendulum", at=[10.0], set={f"solver.{k}": v for k, v in values.items()})
     bench = Bench(get_engine("gauss"), Settings(max_work=work))
     found: dict[str, Any] = orjson.loads(call(bench, ("simulate", request), print))
     return found

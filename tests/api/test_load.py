@@ -26,7 +26,7 @@ Machine = dict[str, Any]
 
 
 def post(client: httpx.Client, machine: Machine) -> httpx.Response:
-    return client.post("/v1/simulate", json={"scene": machine, "times": [0.1]})
+    return client.post("/v1/simulate", json={"scene": machine, "at": [0.1]})
 
 
 def crowd(settings: Settings, machine: Machine, clients: int, seconds: float) -> tuple[Counter[int], list[int]]:

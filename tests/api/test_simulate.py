@@ -38,24 +38,24 @@ def test_lanes_are_the_engines_own(gauss: httpx.Client) -> None:
 
 
 def test_inline_scene_and_values(gauss: httpx.Client, machine: Machine) -> None:
-    answer = post(gauss, machine, values={"initial.OA.angle": 0.5}, times=[0.0])
+    answer = post(gauss, machine, set={"initial.OA.angle": 0.5}, at=[0.0])
     assert answer.status_code == 200
     assert answer.json()["points"][0][0][0] == pytest.approx([np.cos(0.5)])
 
 
 def test_the_end_of_a_run_is_where_another_goes_on(gauss: httpx.Client, machine: Machine) -> None:
     """The answer has the state, which a request takes back; a path would be one of the server's."""
-    whole, first = (post(gauss, machine, times=times).json() for times in ([0.1, 0.2], [0.1]))
-    on = post(gauss, machine | {"initial": {"from": first["end"]}}, times=[0.0, 0.1]).json()
+    whole, first = (post(gauss, machine, at=times).json() for times in ([0.1, 0.2], [0.1]))
+    on = post(gauss, machine | {"initial": {"from": first["end"]}}, at=[0.0, 0.1]).json()
     assert np.array(on["points"]) == pytest.approx(np.array(whole["points"]), abs=1e-9)
-    refused = post(gauss, machine, values={"initial.from": "end.json"})
+    refused = post(gauss, machine, set={"initial.from": "end.json"})
     assert refused.status_code == 422
     assert "`statics` or the `end` of a run's JSON, found 'end.json'" in refused.json()["detail"]
 
 
 def test_refusal_reads_as_the_engine_says_it(gauss: httpx.Client, machine: Machine) -> None:
     """The problem document carries the engine's own line and the field."""
-    answer = post(gauss, machine, values={"bodies.OA.mass": -1.0})
+    answer = post(gauss, machine, set={"bodies.OA.mass": -1.0})
     assert answer.status_code == 422
     assert answer.headers["content-type"] == "application/problem+json"
     assert answer.json()["field"] == "pendulum.bodies.OA.mass"

@@ -20,14 +20,7 @@ from pydantic import (
 )
 from pydantic_core import InitErrorDetails
 
-from shoal.arguments import LIMITS
 from shoal.errors import InputError
-
-
-def limited(name: str, **tighter: float) -> Any:
-    """The limits of an argument, see `LIMITS`, as those of a field."""
-    return Field(**{**LIMITS[name].bounds, **tighter})
-
 
 _MAY_HOLD_TRUTH = (bool, dict, list, tuple)
 
