@@ -27,6 +27,7 @@ class Attitudes:
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
+        self._known: dict[str, Array] = {}
         self._begin = self._rotations()
         self.kept = Orientations(directors={GROUND: tuple(fixed(axis) for axis in np.eye(3)[..., None])}, dimensions=3)
         for name, condition in joints.of_scene(scene):
@@ -40,6 +41,11 @@ class Attitudes:
 
     def rotation(self, body: str) -> Array:
         """The rotation whose columns are the axes of a body; of bodies that joints lock the first that states one."""
+        if body not in self._known:
+            self._known[body] = self._rotation(body)
+        return self._known[body]
+
+    def _rotation(self, body: str) -> Array:
         root, relative = self.kept.root(body)
         if root == GROUND:
             return relative

@@ -21,8 +21,8 @@ from shoal.scene import GROUND, Attachment, Scene
 class SpatialBodies(AttitudeVectors, RigidBodies):
     """Separate rigid bodies in space; axes are those of the attitudes that the scene states."""
 
-    def __init__(self, scene: Scene, apart: bool = False) -> None:
-        self.attitudes = Attitudes(scene)
+    def __init__(self, scene: Scene, apart: bool = False, attitudes: Attitudes | None = None) -> None:
+        self.attitudes = attitudes or Attitudes(scene)
         super().__init__(scene, apart)
 
     def of_image(self, side: Attachment, image: Any) -> Affine:

@@ -7,6 +7,7 @@ values are kept exactly if possible; all others follow from them, with the least
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -120,6 +121,10 @@ class _Start:
                 axes[:, k] = np.array([place_at(one, self.q) for one in frame.directors]).transpose(2, 1, 0)
         return Poses(origins, axes, np.zeros(origins.shape[:2]))
 
+    @cached_property
+    def _bodies(self) -> SpatialBodies:
+        return SpatialBodies(self.scene, attitudes=self.placement.attitudes)
+
     def _open(self, begin: Poses) -> Array:
         """Return the largest residual of joints between rigid bodies by lane or of all, relative to the size.
 
@@ -128,7 +133,7 @@ class _Start:
         """
         scene = self.scene
         rigid = [name for name, j in scene.joints.items() if all(is_stiff(scene, side.body) for side in places(j))]
-        rows = Closure(scene, begin, bodies=SpatialBodies(scene)).rows(begin)
+        rows = Closure(scene, begin, bodies=self._bodies).rows(begin)
         gaps = np.abs(rows.gap / np.where(rows.angular, 1.0, self.size)) * np.isin(rows.names, rigid)
         found = np.asarray(np.max(gaps, axis=1, initial=0.0))
         return found if len(found) == self.lanes else np.max(found, keepdims=True)
@@ -138,7 +143,7 @@ class _Start:
         scene = self.scene
         self._spread(max(self.lanes, lanes_of((scene.initial, scene.joints, scene.bodies))))
         chosen, begin = np.repeat(chosen, self.lanes // len(chosen)), self._poses()
-        assembly = Assembly(scene, self.lanes, SpatialBodies(scene), begin)
+        assembly = Assembly(scene, self.lanes, self._bodies, begin)
         found = assembly.run()
         if self.lanes == 1 and not found.ok[0]:
             if not gives_way(scene):
