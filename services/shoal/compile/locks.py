@@ -30,14 +30,15 @@ if sys.platform != "win32":
     import fcntl
 
 SECONDS = {
-    "_constrain": 10.0,
-    "loop": 10.0,
+    "_least": 16.0,
+    "loop": 5.0,
     "_motion": 4.0,
-    "_stiffness": 4.0,
-    "_settle": 3.0,
+    "_constrain": 3.0,
+    "_stiffness": 3.0,
     "_force": 3.0,
-    "_energies": 2.0,
+    "_settle": 2.0,
     "_energy": 1.0,
+    "_energies": 1.0,
 }
 """Seconds that large kernels take to compile on one core of a server: for their order and the estimate shown."""
 _WORTH_A_LINE = 1.0

@@ -86,6 +86,13 @@ def _layout(kind: Any) -> str:
     return f"{own.__module__}.{own.__qualname__}{kind.fields}({parts})" if own else f"{kind}({parts})"
 
 
+def leading(kind: Any, count: int) -> Reference:
+    """Return the type of a reference to the first members of a structure: code that reads no others serves all
+    structures that begin with these.
+    """
+    return Reference(types.NamedTuple(kind.types[:count], kind.instance_class))
+
+
 @register_model(Reference)
 class _Address(models.PrimitiveModel):  # type: ignore[misc]
     def __init__(self, manager: Any, kind: Reference) -> None:
@@ -103,7 +110,8 @@ class _Members(AttributeTemplate):  # type: ignore[misc]
     def generic_resolve(self, reference: Reference, name: str) -> Any:
         """Return the type of a member."""
         kind = reference.dtype
-        return _member(kind.types[kind.fields.index(name)]) if name in kind.fields else None
+        members = dict(zip(kind.fields, kind.types, strict=False))  # see `leading`
+        return _member(members[name]) if name in members else None
 
 
 @lower_getattr_generic(Reference)

@@ -215,7 +215,7 @@ def _constrain(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, 
     while searching:
         if r.size > 0:
             rubbing.load(tile, r, m.unknowns, m.rows, w.gauss.multiplier, w.rubbing, a)
-        principle.constrain(tile, m, w.gauss, t, z, zdot, a, tolerance)
+        function_pointers.call(m.table.least, (tile, m, w, t, z, zdot, tolerance, a))
         rounds += 1
         searching = r.size > 0 and rounds < rubbing.ROUNDS
         searching = searching and rubbing.away(tile, r, m.rows, w.gauss.multiplier, w.rubbing) > rubbing.SETTLED

@@ -18,13 +18,13 @@ from numba import njit, typeof, types
 from shoal.compile import locks
 from shoal.compile.function_pointers import address, call
 from shoal.compile.pointers import raw_type
-from shoal.compile.structures import Reference, storage
+from shoal.compile.structures import Reference, leading, storage
 from shoal.mechanics import dynamics
 from shoal.mechanics.dynamics import ACCELERATION, ALL, ELASTIC, SIMPLE, Work, instant
 from shoal.mechanics.elements import families
-from shoal.mechanics.least import drift
+from shoal.mechanics.least import drift, principle
 from shoal.mechanics.least.principle import PROJECTION
-from shoal.mechanics.model import Arrays, FunctionTable
+from shoal.mechanics.model import COMMON, Arrays, FunctionTable
 from shoal.mechanics.numerics.tile import SINGLE, Array, Index, Tile, index
 
 Kernel = tuple[Any, tuple[Any, ...]]
@@ -111,6 +111,11 @@ def _constrain(tile, m, w, t, z, zdot, tolerance, a):  # type: ignore[no-untyped
 
 
 @njit(cache=True, error_model="numpy")
+def _least(tile, m, w, t, z, zdot, tolerance, a):  # type: ignore[no-untyped-def]
+    principle.constrain(tile, m, w.gauss, t, z, zdot, a, tolerance)
+
+
+@njit(cache=True, error_model="numpy")
 def _force(tile, family, z, zdot, f, w, power, moving):  # type: ignore[no-untyped-def]
     families.add_force(tile, family, z, zdot, f, w, power, moving)
 
@@ -135,9 +140,13 @@ _STATE_KERNELS: dict[str, Kernel] = {
     "motion": (_motion, (_NUMBER, _ROWS, _ROWS, _NUMBER, _ROWS, _COUNT)),
     "energies": (_energies, ()),
     "constrain": (_constrain, (_NUMBER, _ROWS, _ROWS, _NUMBER, _ROWS)),
+    "least": (_least, (_NUMBER, _ROWS, _ROWS, _NUMBER, _ROWS)),
     "settle": (_settle, (_NUMBER, _NUMBER, _COUNT, _FLAG)),
 }
-"""Kernels of a whole state, and the types of their arguments after the tile and the two structures."""
+"""Kernels of a whole state in the order of `FunctionTable`, and the types of their arguments after the tile and the two
+structures."""
+_OF_CONSTRAINTS = ("least", "settle")
+"""Those that are the same in the plane and in space."""
 _FAMILY_KERNELS: dict[str, Kernel] = {
     "force": (_force, (_ROWS, _ROWS, _ROWS, _ROWS, _ROWS, _FLAG)),
     "energy": (_energy, (_ROWS, _ROWS, _ROWS, _COUNT)),
@@ -157,11 +166,9 @@ def ready(tile: Tile, arrays: Arrays, room: Work) -> Arrays:
     key = len(tile), len(arrays.space), arrays.constraints.size > 0, acting
     if key not in _READY:
         wanted = _wanted(arrays)
-        motion, energies, constrain, settle = (
-            _address(name, tile, arrays, room) if name in wanted else 0 for name in _STATE_KERNELS
-        )
+        state = [_address(name, tile, arrays, room) if name in wanted else 0 for name in _STATE_KERNELS]
         force, energy = (family_pointers(name, tile, arrays.elements) for name in ("force", "energy"))
-        _READY[key] = FunctionTable(motion, energies, constrain, settle, force, energy)
+        _READY[key] = FunctionTable._make([*state, force, energy, 0])
     return arrays._replace(storage=storage(), table=_READY[key])
 
 
@@ -192,7 +199,9 @@ def _kernel(name: str, tile: Tile, *parts: Any) -> Kernel:
         kernel, own = _FAMILY_KERNELS[name]
         return kernel, (typeof(tile), *raws, *own)
     kernel, own = _STATE_KERNELS[name]
-    return kernel, (typeof(tile), *(Reference(kind) for kind in raws), *own)
+    model, room = raws
+    kind = leading(model, COMMON) if name in _OF_CONSTRAINTS else Reference(model)
+    return kernel, (typeof(tile), kind, Reference(room), *own)
 
 
 def _address(name: str, tile: Tile, *parts: Any) -> int:

@@ -37,12 +37,13 @@ from shoal.scene.joints import places
 class FunctionTable(NamedTuple):
     """Addresses of the compiled `kernels` for one tile; 0 for a kernel that the model never calls.
 
-    force, energy: by family of elements. sought: what seeks accelerations in place of `constrain`'s own ways.
+    force, energy: by family of elements. sought: what seeks accelerations in place of `least`.
     """
 
     motion: int
     energies: int
     constrain: int
+    least: int
     settle: int
     force: Index
     energy: Index
@@ -50,7 +51,7 @@ class FunctionTable(NamedTuple):
 
 
 class Arrays(NamedTuple):
-    """All a kernel needs of one tile of lanes. space: a tuple as long as vectors are.
+    """All a kernel needs of one tile of lanes. space: a tuple as long as vectors are, in the plane and in space.
 
     method, baumgarte: how accelerations are found. mass_factor, mass_root: of the regularised mass matrix; lent: the
     mass added to flat bodies, empty where none is; refinements: iterations that compensate it, see `least.lent`.
@@ -59,7 +60,6 @@ class Arrays(NamedTuple):
 
     storage: Array
     table: FunctionTable
-    space: tuple[int, ...]
     unknowns: int
     force_rows: int
     held_rows: int
@@ -78,13 +78,18 @@ class Arrays(NamedTuple):
     refinements: int
     alike: Alike
     weight: Array
-    elements: tuple[Any, ...]
-    forces: Forces
-    applied: Applied
     functions: Functions
     constraints: Constraints
     saddle: Saddle
     rubbing: Rubbing
+    space: tuple[int, ...]
+    elements: tuple[Any, ...]
+    forces: Forces
+    applied: Applied
+
+
+COMMON = Arrays._fields.index("space")
+"""Number of the first members, which have the same types in the plane and in space."""
 
 
 @njit(cache=True)
@@ -275,12 +280,12 @@ class Model:
         weightless = ~known | (np.where(known, inverse, 0.0) * whole >= _SINGULAR)
         if np.any(weightless):
             raise self._singular({*(np.flatnonzero(weightless) // len(tile)).tolist()})
-        forces = self.elements, self.forces, self.applied, self.functions, self.constraints, self._saddle, self.rubbing
+        forces = self.elements, self.forces, self.applied
+        parts = self.functions, self.constraints, self._saddle, self.rubbing, (0,) * self.dimensions, *forces
         nobody = np.zeros(len(self.elements), dtype=np.int64)
         return Arrays(
             structures.storage(),
-            FunctionTable(0, 0, 0, 0, nobody, nobody),
-            (0,) * self.dimensions,
+            FunctionTable(0, 0, 0, 0, 0, nobody, nobody),
             self.unknowns,
             self.force_rows,
             self.held_rows,
@@ -299,7 +304,7 @@ class Model:
             REFINEMENTS if self.flat else 0,
             self._alike,
             pack(self.weight, lanes, tile),
-            *packed(forces, lanes, tile),
+            *packed(parts, lanes, tile),
         )
 
 

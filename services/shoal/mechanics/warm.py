@@ -62,25 +62,15 @@ def warm(integrators: Iterable[str] = tuple(INTEGRATORS), note: Note = lambda _:
     """Compile kernels that the cache lacks, on all cores, and load them; return the time [s].
 
     every: for any scene, with constraints and all families of elements, for statics, modes and reactions, and for usual
-    integrators in space too; else for planar cables that hang together. The first integrator comes with the kernels of
-    the mechanics, which the others share. `note` takes lines of progress.
+    integrators in space too; else for planar cables that hang together. `note` takes lines of progress.
     """
     begin = time.perf_counter()
-    first, *others = integrators
-    for names in ([first], others):
-        wanted = [
-            kernel
-            for name in names
-            for scene in _machines(name, every=every)
-            for lanes in _lanes(name)
-            for kernel in required(scene, lanes, every=every)
-        ]
-        ahead(wanted, note)
+    runs = [(scene, lanes) for name in integrators for scene in _machines(name, every=every) for lanes in _lanes(name)]
+    ahead([kernel for scene, lanes in runs for kernel in required(scene, lanes, every=every)], note)
     with reporting_to(note):  # what is small
-        for name in (first, *others):
-            for scene, lanes in itertools.product(_machines(name, every=every), _lanes(name)):
-                angles = {"initial.OA.angle": np.linspace(0.7, 0.8, lanes)} if lanes > 1 else None
-                simulate(scene, np.array([4e-4]), angles)
+        for scene, lanes in runs:
+            angles = {"initial.OA.angle": np.linspace(0.7, 0.8, lanes)} if lanes > 1 else None
+            simulate(scene, np.array([4e-4]), angles)
     return time.perf_counter() - begin
 
 
