@@ -142,10 +142,10 @@ def _rest(data: dict[str, Any], scene: Scene, away: dict[str, float]) -> None:
     """States the angles [rad], as the mechanics counts them, of torsion springs that rest so far from the start."""
     from shoal.mechanics.assembly.loads import Loads
     from shoal.mechanics.assembly.placement import place
-    from shoal.mechanics.derived import Rows
+    from shoal.mechanics.derived import RowAllocator
 
     if away:
-        loads = Loads(scene, place(scene), Rows(0), 0.0)
+        loads = Loads(scene, place(scene), RowAllocator(0), 0.0)
         start = dict(zip(loads.names, loads.angles, strict=True))
         for name, angle in away.items():
             data["loads"][name]["angle"] = float(np.ravel(start[name])[0]) + angle

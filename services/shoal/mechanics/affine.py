@@ -17,8 +17,8 @@ import numpy as np
 from shoal.mechanics import plane
 from shoal.mechanics.numerics.tile import Array, Number
 
-ROUND_OFF = 1e-12
-"""Of the coefficients of a unit vector, and of places in parts of the machine's size: some thousand rounding errors."""
+NEGLIGIBLE = 1e-12
+"""Coefficients of unit vectors, and places in parts of the machine's size, that are round-off: some thousand eps."""
 
 
 def is_zero(value: Number) -> bool:
@@ -52,7 +52,7 @@ class Affine:
     @property
     def rests(self) -> bool:
         """Return whether the vector depends on the coordinates by no more than round-off."""
-        return all(np.max(np.abs(coefficient)) <= ROUND_OFF for coefficient in self.terms.values())
+        return all(np.max(np.abs(coefficient)) <= NEGLIGIBLE for coefficient in self.terms.values())
 
     def turned(self, matrix: Array) -> Affine:
         """The vector mapped by a matrix, (d, d) or (d, d, lanes)."""

@@ -25,7 +25,7 @@ class Derived(NamedTuple):
     constant: Array
 
 
-class Rows:
+class RowAllocator:
     """Hands out the rows of vectors, in the order in which they are asked for."""
 
     def __init__(self, unknowns: int) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from shoal.mechanics.assembly.loads import Loads
 from shoal.mechanics.assembly.placement import place
-from shoal.mechanics.derived import Rows
+from shoal.mechanics.derived import RowAllocator
 from shoal.mechanics.forces import ANGLE
 from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import Array
@@ -91,5 +91,5 @@ def _counting(model: Model) -> list[tuple[str, int]]:
     numbers = np.flatnonzero(model.forces.kind == ANGLE)
     if not numbers.size:
         return []
-    names = Loads(model.stated, place(model.stated), Rows(0), 0.0).names
+    names = Loads(model.stated, place(model.stated), RowAllocator(0), 0.0).names
     return [(names[number], int(number)) for number in numbers]

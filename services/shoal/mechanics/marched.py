@@ -121,9 +121,9 @@ class Frame(NamedTuple):
     """Input of the time loop for one tile.
 
     step: [s], of schemes of fixed step, which take `steps` of them; adaptive ones end at the last of the times and take
-    at most so many. times: at which the marker rows are sampled [s], increasing, `samples` of them; directed: number of
-    marker rows; halts: where steps end, `stops` times and `marks` marks; there forces may jump, and driven constraints
-    their rates. tolerance: from which rows count as dependent. What is not reached stays nan in the record.
+    at most that number. times: at which the marker rows are sampled [s], increasing, `samples` of them; directed:
+    number of marker rows; halts: where steps end, `stops` times and `marks` marks; there forces may jump, and driven
+    constraints their rates. tolerance: from which rows count as dependent. What is not reached stays nan in the record.
     """
 
     tile: Tile
@@ -185,7 +185,7 @@ NUMBERS = 11
 
 
 @njit(cache=True, error_model="numpy")
-def told(
+def reduce_record(
     record: Marched,
     width: int,
     first: int,

@@ -26,7 +26,16 @@ from shoal.mechanics.halts import Halts
 from shoal.mechanics.integrators import Choice, halting
 from shoal.mechanics.integrators import facts as facts_of
 from shoal.mechanics.kernels import Seek
-from shoal.mechanics.marched import CLOSENESS, CONSTRAINT_DRIFT, ENERGY_DRIFT, EVALUATIONS, NUMBERS, STEPS, TURN, told
+from shoal.mechanics.marched import (
+    CLOSENESS,
+    CONSTRAINT_DRIFT,
+    ENERGY_DRIFT,
+    EVALUATIONS,
+    NUMBERS,
+    STEPS,
+    TURN,
+    reduce_record,
+)
 from shoal.mechanics.model import Arrays, Model
 from shoal.mechanics.numerics.tile import SINGLE, WIDE, Array, Tile, stacked, tiles
 from shoal.mechanics.start import start
@@ -107,7 +116,7 @@ class Runs:
                 space = Workspace(self.scene.solver, moved, self.choice, tile, part, times, halts, seek, spare, whole)
             record = space.run(moved, part, stop)
             record = record if states is None else split(record, states, len(tile), part)
-            told(record, len(tile), part.start, turns, limits.anchors, floor, limits.span, motion, numbers)
+            reduce_record(record, len(tile), part.start, turns, limits.anchors, floor, limits.span, motion, numbers)
             if single:
                 left.append(space.left)
             if single not in self._found:

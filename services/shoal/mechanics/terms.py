@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from shoal.mechanics import plane
-from shoal.mechanics.affine import ROUND_OFF, Affine, fixed
+from shoal.mechanics.affine import NEGLIGIBLE, Affine, fixed
 from shoal.mechanics.constraints import LINEAR, OPEN, WAYS, Constraints
-from shoal.mechanics.derived import Rows
+from shoal.mechanics.derived import RowAllocator
 from shoal.mechanics.numerics.tile import Array, Number, index, stacked
 from shoal.scene.function import Composed
 
@@ -62,7 +62,7 @@ class Term:
         """Return whether every product of unknowns counts by round-off only. size: a length of the machine [m]."""
         if self.angles:
             return False
-        small = ROUND_OFF * min(size**self.lengths, size ** (self.lengths - 1))
+        small = NEGLIGIBLE * min(size**self.lengths, size ** (self.lengths - 1))
         one, other = ({CONSTANT: vector.constant, **vector.terms} for vector in (self.u, self.w))
         found: dict[frozenset[int], Number] = {}
         for (i, u), (j, w) in product(one.items(), other.items()):
@@ -161,7 +161,7 @@ def drives(terms: Terms) -> dict[int, Term]:
     return found
 
 
-def assemble(terms: Terms, rows: Rows, driven: int, size: float) -> Constraints:
+def assemble(terms: Terms, rows: RowAllocator, driven: int, size: float) -> Constraints:
     """The lists of the collected constraints. Their drives are numbered from `driven` on, in the order of `drives`.
 
     size: a length of the machine [m].

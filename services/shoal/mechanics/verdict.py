@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from shoal.mechanics import reach as reaches
-from shoal.mechanics.affine import ROUND_OFF
+from shoal.mechanics.affine import NEGLIGIBLE
 from shoal.mechanics.constraints import OPEN
 from shoal.mechanics.forces import ANGLE, LAW, STIFFNESS
 from shoal.mechanics.functions import value
@@ -49,7 +49,7 @@ _JUDGED = slice(FARTHEST, CONSTRAINT_DRIFT + 1)
 class Limits:
     """Limits of the checks of a scene's runs, computed once.
 
-    numbers, here and below: results of `marched.told` for every lane, (NUMBERS, lanes).
+    numbers, here and below: results of `reduce_record` for every lane, (NUMBERS, lanes).
     """
 
     def __init__(self, scene: Scene, model: Model) -> None:
@@ -68,7 +68,7 @@ class Limits:
         self._weight = float(np.max(np.abs(model.weight), initial=0.0))
         stiff = max(np.max(family.coefficients, initial=0.0) for family in model.elements)
         self._mass = float(sum(np.max(part) for (row, column), part in model.mass_entries.items() if row == column))
-        self._still = self._weight * 1e-9 * self.span + 1e-12 * float(stiff) + self._sprung() * ROUND_OFF**2 / 2
+        self._still = self._weight * 1e-9 * self.span + 1e-12 * float(stiff) + self._sprung() * NEGLIGIBLE**2 / 2
         # So far away a marker may be whatever the energy of the run.
         near = np.minimum(self._reach(np.zeros(1)), np.finfo(float).max)
         tolerances = np.array([[scene.solver.energy_tolerance], [OPEN]])
@@ -76,7 +76,7 @@ class Limits:
 
     def _reach(self, energy: Array) -> Array:
         """Return the largest distance of a marker [m]; round-off for a wheel's centre, which does not move."""
-        return reaches.MARGIN * reaches.reach(self._model.scene, energy) + ROUND_OFF * self.span
+        return reaches.MARGIN * reaches.reach(self._model.scene, energy) + NEGLIGIBLE * self.span
 
     def _sprung(self) -> float:
         """The sum of what springs are stiff by where they are relaxed, by the machine's size or by 1 rad [J]."""

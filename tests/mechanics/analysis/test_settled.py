@@ -14,7 +14,7 @@ from scipy.integrate import solve_bvp
 from shoal.cli import main
 from shoal.errors import InputError
 from shoal.mechanics.analysis import settled as module
-from shoal.mechanics.analysis.equilibrium import Held
+from shoal.mechanics.analysis.equilibrium import EquilibriumStatus
 from shoal.mechanics.analysis.settled import settled
 from shoal.scene import Scene
 
@@ -118,7 +118,7 @@ def test_a_coarse_tolerance_takes_a_coarse_mesh() -> None:
 def test_what_no_mesh_settles_is_failed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "DOUBLINGS", 2)
     found = settled(cantilever("ancf-cable"), 1e-8)
-    assert found.status is Held.FAILED
+    assert found.status is EquilibriumStatus.FAILED
     assert "within the tolerance 1e-08 m" in found.message
 
 

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 from shoal.cli import main
 from shoal.errors import ComputationError
 from shoal.mechanics.analysis.damped import roots
-from shoal.mechanics.analysis.equilibrium import Held
+from shoal.mechanics.analysis.equilibrium import EquilibriumStatus
 from shoal.mechanics.analysis.mesh_error import of_modes
 from shoal.mechanics.analysis.modes import modes
 from shoal.mechanics.analysis.small_motions import ROUND, BoundedMatrix, hides, spectrum
@@ -115,7 +115,7 @@ def test_a_pendulum_beside_a_stiff_rod_is_held() -> None:
 
 
 def test_a_pendulum_standing_beside_a_stiff_rod_is_unstable() -> None:
-    assert statics(_beside(UP), leave_unstable=False).status is Held.UNSTABLE
+    assert statics(_beside(UP), leave_unstable=False).status is EquilibriumStatus.UNSTABLE
     found = modes(_beside(UP), about="start", count=1)
     (mode,) = found.modes
     assert mode.kind == "unstable"

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.special import ellipeinc, ellipk, ellipkinc
 from shoal.cli import main
-from shoal.mechanics.analysis.equilibrium import Equilibrium, Held
+from shoal.mechanics.analysis.equilibrium import Equilibrium, EquilibriumStatus
 from shoal.mechanics.analysis.statics import statics
 from shoal.scene import Scene, load_scene
 
@@ -150,7 +150,7 @@ def test_column_buckles_into_the_elastica() -> None:
     below = _solved(column(0.99))
     assert abs(below.marker("tip")[0]) < 1e-9
     straight = statics(column(1.2), leave_unstable=False)
-    assert straight.status is Held.UNSTABLE
+    assert straight.status is EquilibriumStatus.UNSTABLE
     assert abs(straight.marker("tip")[0]) < 1e-9
     found = _solved(column(1.2))
     root = np.sqrt(1.2 * np.pi**2 / 4)
@@ -222,7 +222,7 @@ def test_pendulum_on_a_torsion_spring() -> None:
 def test_inverted_pendulum_is_unstable_or_is_left() -> None:
     scene = _pendulum(np.pi / 2)
     standing = statics(scene, leave_unstable=False)
-    assert standing.status is Held.UNSTABLE
+    assert standing.status is EquilibriumStatus.UNSTABLE
     assert standing.eigenvalues[0] == pytest.approx(-1.5 * 9.81, rel=1e-12)
     assert "rod" in standing.message
     found = _solved(scene)
@@ -232,13 +232,13 @@ def test_inverted_pendulum_is_unstable_or_is_left() -> None:
 
 def test_what_nothing_holds_is_refused_by_name() -> None:
     floating = statics(_pendulum(0.3, gravity=[0.0, 0.0]))
-    assert floating.status is Held.UNHELD
+    assert floating.status is EquilibriumStatus.UNHELD
     assert "nothing holds rod" in floating.message
     falling = _pendulum(0.0).model_dump(mode="json")
     falling["joints"] = {}
     falling["initial"]["rod"]["position"] = [0.0, 0.0]
     found = statics(Scene.parse(falling))
-    assert found.status is Held.UNHELD
+    assert found.status is EquilibriumStatus.UNHELD
     assert "falls" in found.message
     assert not found.ok
 
@@ -309,7 +309,7 @@ def test_two_bodies_under_a_force_that_follows_come_to_rest_from_afar() -> None:
 def test_what_turns_without_end_is_told_with_what_turns_it(load: dict[str, Any]) -> None:
     """More than the weight can hold at any angle, m g L / 2 = 4.9 N m."""
     found = statics(_pendulum(0.0, loads={"drive": load}))
-    assert found.status is Held.UNHELD
+    assert found.status is EquilibriumStatus.UNHELD
     assert "nothing holds rod against drive" in found.message
     assert "turns" in found.message
 

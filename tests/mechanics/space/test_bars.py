@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from shoal import statics
-from shoal.mechanics.analysis.equilibrium import Held
+from shoal.mechanics.analysis.equilibrium import EquilibriumStatus
 from shoal.scene import Scene
 
 GRAVITY = 9.81
@@ -50,7 +50,7 @@ def test_a_tripod_stands_and_its_bars_bear_what_three_balances_say(kind: str) ->
         "loads": {"f": {"kind": "force", "at": {"body": "m"}, "force": LOAD.tolist()}},
     })  # fmt: skip
     found = statics(scene)
-    assert found.status is Held.OK
+    assert found.status is EquilibriumStatus.OK
     assert found.message == "r0, r1, r2: free to spin about their axes, which moves nothing"
     along, down = (ways / lengths[:, None]).T, np.array([0.0, 0.0, -1.0])
     axial = np.linalg.solve(along, -LOAD - (3.0 * GRAVITY + weights.sum() / 2) * down)
@@ -72,7 +72,7 @@ def test_a_chain_of_bars_hangs_straight_down_however_it_was_turned() -> None:
         "initial": {f"r{k}": {"rotation": rotation} for k, rotation in enumerate(starts)},
     })  # fmt: skip
     found = statics(scene)
-    assert found.status is Held.OK
+    assert found.status is EquilibriumStatus.OK
     assert "r0, r1, r2: free to spin about their axes" in found.message
     assert found.marker("tip") == pytest.approx([0.0, 0.0, -1.5], abs=1e-9)
 
@@ -86,5 +86,5 @@ def test_a_body_whose_spin_moves_a_marker_is_not_held() -> None:
         "markers": {"m": {"body": "r", "point": [0.2, 0.01, 0.0]}}, "initial": {"r": {"rotation": [0.0, 0.0, 0.0]}},
     })  # fmt: skip
     found = statics(scene)
-    assert found.status is Held.UNHELD
+    assert found.status is EquilibriumStatus.UNHELD
     assert found.message.startswith("nothing holds r")

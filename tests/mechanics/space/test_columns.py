@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
-from shoal.mechanics.analysis.equilibrium import Held
+from shoal.mechanics.analysis.equilibrium import EquilibriumStatus
 from shoal.mechanics.analysis.statics import statics
 from shoal.scene import Scene
 
@@ -42,12 +42,12 @@ def elastica(ratio: float) -> tuple[float, float]:
     return 2 * k / (np.pi * root), 2 * (1 - ellipe(k * k) / ellipk(k * k))
 
 
-@pytest.mark.parametrize(("ratio", "status"), [(0.99, Held.OK), (1.01, Held.UNSTABLE)])
-def test_it_stands_up_to_eulers_load(ratio: float, status: Held) -> None:
+@pytest.mark.parametrize(("ratio", "status"), [(0.99, EquilibriumStatus.OK), (1.01, EquilibriumStatus.UNSTABLE)])
+def test_it_stands_up_to_eulers_load(ratio: float, status: EquilibriumStatus) -> None:
     found = statics(column(ratio * CRITICAL, 4), leave_unstable=False)
     assert found.status is status
     assert abs(found.marker("M")[1]) < 1e-9
-    assert status is Held.UNSTABLE or "R: free to spin about its axis" in found.message
+    assert status is EquilibriumStatus.UNSTABLE or "R: free to spin about its axis" in found.message
 
 
 @pytest.mark.slow

@@ -18,7 +18,7 @@ from shoal.scene import Rod, Scene
 from shoal.trajectory import plain
 
 
-class Held(StrEnum):
+class EquilibriumStatus(StrEnum):
     """Status of a search for an equilibrium. Only `ok` is accepted."""
 
     OK = "ok"
@@ -49,7 +49,7 @@ class Equilibrium:
 
     scene: Scene
     time: float
-    status: Held
+    status: EquilibriumStatus
     message: str
     balanced: bool
     q: Array
@@ -101,12 +101,12 @@ class Equilibrium:
     @property
     def ok(self) -> bool:
         """Return whether this is a stable equilibrium."""
-        return self.status is Held.OK
+        return self.status is EquilibriumStatus.OK
 
     @property
     def stable(self) -> bool:
         """Return whether every small displacement is pulled back."""
-        return self.status is not Held.UNSTABLE and bool(np.all(np.real(self.eigenvalues) > self.levels))
+        return self.status is not EquilibriumStatus.UNSTABLE and bool(np.all(np.real(self.eigenvalues) > self.levels))
 
     def marker(self, name: str) -> Array:
         """Position of a marker [m], (d,)."""

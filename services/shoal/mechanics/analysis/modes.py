@@ -52,7 +52,7 @@ RELATIVE = "of the eigenvalue"
 
 
 @dataclass(frozen=True, eq=False)
-class Mode:
+class Eigenmode:
     """One small motion, shape * exp(eigenvalue * t).
 
     eigenvalue [1/s]: imaginary part the frequency of the oscillation [rad/s], real part its growth. shape: displacement
@@ -123,7 +123,7 @@ class Modes:
     message: str
     q: Array
     markers: tuple[str, ...]
-    modes: tuple[Mode, ...]
+    modes: tuple[Eigenmode, ...]
     mesh_errors: tuple[float, ...] = ()
     speed: float | None = None
     moving: str = ""
@@ -322,7 +322,7 @@ def modes_of_motion(
     at, turning = _seen(scene, placement, evaluator, motion.q)
     told = tuple(
         _named_movers(
-            Mode(one.value, one.shape, at @ one.shape, turning @ one.shape, False, one.whirl, one.rotating), scene
+            Eigenmode(one.value, one.shape, at @ one.shape, turning @ one.shape, False, one.whirl, one.rotating), scene
         )
         for one in whirls(motion, placement)[:count]
     )
@@ -365,14 +365,14 @@ def _modes(scene: Scene, evaluator: Evaluator, q: Array, time: float, count: int
     ]
     at, turning = _seen(scene, Machine.of(scene).placement, evaluator, q)
     told = tuple(
-        _named_movers(Mode(complex(value), shape, at @ shape, turning @ shape, unknown), scene)
+        _named_movers(Eigenmode(complex(value), shape, at @ shape, turning @ shape, unknown), scene)
         for value, shape, unknown in list(zip(roots.values, roots.shapes.T, hidden, strict=True))[:count]
     )
     balanced = balance.residual(view) <= BALANCED
     return Modes(scene, about, balanced, message, q, tuple(scene.markers), told)
 
 
-def _named_movers(mode: Mode, scene: Scene) -> Mode:
+def _named_movers(mode: Eigenmode, scene: Scene) -> Eigenmode:
     """Name the bodies that an unstable mode moves."""
     if mode.kind != "unstable":
         return mode

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from shoal.arguments import check
-from shoal.mechanics.analysis.equilibrium import Equilibrium, Held
+from shoal.mechanics.analysis.equilibrium import Equilibrium, EquilibriumStatus
 from shoal.mechanics.analysis.mesh_error import apart, beyond, finer
 from shoal.mechanics.analysis.statics import statics
 from shoal.scene import Scene
@@ -65,4 +65,8 @@ def _refined(scene: Scene, tolerance: float, time: float, begun: Equilibrium | N
             return found
     if not found.ok:
         return found
-    return replace(found, status=Held.FAILED, message=f"no mesh that was tried is within the tolerance {tolerance:g} m")
+    return replace(
+        found,
+        status=EquilibriumStatus.FAILED,
+        message=f"no mesh that was tried is within the tolerance {tolerance:g} m",
+    )

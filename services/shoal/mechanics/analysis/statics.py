@@ -20,7 +20,7 @@ from shoal.mechanics.affine import points
 from shoal.mechanics.analysis import left_out
 from shoal.mechanics.analysis.balance import BALANCED, FALLS, Balance, View
 from shoal.mechanics.analysis.damped import small
-from shoal.mechanics.analysis.equilibrium import Equilibrium, Held
+from shoal.mechanics.analysis.equilibrium import Equilibrium, EquilibriumStatus
 from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.analysis.going_on import as_stated
 from shoal.mechanics.analysis.idle_spins import idle_spins
@@ -97,7 +97,7 @@ class _Search:
         q = self._assembled()
         q, gap = self.balance.restore(q)
         if gap > GAPE * self.balance.size:
-            return self._ending(q, Held.FAILED, f"the joints cannot be closed: they gape by {gap:.2g}")
+            return self._ending(q, EquilibriumStatus.FAILED, f"the joints cannot be closed: they gape by {gap:.2g}")
         self._leave_out_spins(q)
         has_potential = not self.evaluator.follows
         message = ""
@@ -165,47 +165,51 @@ class _Search:
             if found.message == FALLS:
                 moved = found.point - self.evaluator.model.q0[:, 0]
                 text = f"nothing holds {self._movers(moved)}; it falls without end"
-                return self._ending(found.point, Held.UNHELD, text)
+                return self._ending(found.point, EquilibriumStatus.UNHELD, text)
             driving, turns = self._driving(), np.abs(self.wound) / (2 * np.pi)
             if np.max(turns, initial=0.0) > TURNS:
                 name, most = self.owners[int(np.argmax(turns))], np.max(turns)
                 text = f"nothing holds {name} against {driving}; after {most:.0f} turns it goes on turning"
-                return self._ending(found.point, Held.UNHELD, text)
+                return self._ending(found.point, EquilibriumStatus.UNHELD, text)
             message += found.message
             if self.evaluator.follows:
                 message += f" under what follows its motion ({driving}); a start nearer to rest may help"
-            return self._ending(found.point, Held.FAILED, message, found)
+            return self._ending(found.point, EquilibriumStatus.FAILED, message, found)
         if residual > BALANCED:
             text = f"{message}the forces do not balance, {residual:.1g} of them is left"
-            return self._ending(found.point, Held.FAILED, text, found)
+            return self._ending(found.point, EquilibriumStatus.FAILED, text, found)
         growth = self._growth(found.point, view) if self.evaluator.follows else None
         if growth is not None and growth > 0:
             text = f"forces that follow the motion make it grow with exp(t * {growth:.4g}/s)"
-            return self._ending(found.point, Held.UNSTABLE, text, found)
+            return self._ending(found.point, EquilibriumStatus.UNSTABLE, text, found)
         complex_pair = np.any(np.abs(np.imag(eigenvalues)) > 1e-9 * np.abs(eigenvalues) + levels)
         if growth is None and complex_pair:
-            return self._ending(found.point, Held.UNSTABLE, "forces that follow the motion make it flutter", found)
+            return self._ending(
+                found.point, EquilibriumStatus.UNSTABLE, "forces that follow the motion make it flutter", found
+            )
         if len(eigenvalues) and np.real(eigenvalues[0]) < -levels[0]:
             text = f"unstable: it leaves with exp(t * {np.sqrt(-np.real(eigenvalues[0])):.4g}/s); moves first: "
-            return self._ending(found.point, Held.UNSTABLE, message + text + self._movers(lowest), found)
+            return self._ending(found.point, EquilibriumStatus.UNSTABLE, message + text + self._movers(lowest), found)
         loose = np.real(eigenvalues) <= levels
         if np.any(loose) and hides(levels[loose], eigenvalues, pull(self.scene)):
             least = float(np.sqrt(np.max(levels[loose])))
             text = f"{message}round-off hides whether {self._movers(lowest)} is held, by less than {least:.1g} rad/s"
-            return self._ending(found.point, Held.UNTOLD, text, found)
+            return self._ending(found.point, EquilibriumStatus.UNTOLD, text, found)
         if np.any(loose):
             text = f"{message}nothing holds {self._movers(lowest)}; it may rest in other places as well"
-            return self._ending(found.point, Held.UNHELD, text, found)
+            return self._ending(found.point, EquilibriumStatus.UNHELD, text, found)
         if self.spinning:
             axes = "its axis" if len(self.spinning) == 1 else "their axes"
             message += f"{', '.join(self.spinning)}: free to spin about {axes}, which moves nothing"
-        return self._ending(found.point, Held.OK, message.rstrip("; "), found)
+        return self._ending(found.point, EquilibriumStatus.OK, message.rstrip("; "), found)
 
-    def _ending(self, q: Array, status: Held, message: str, found: Root[Array] | None = None) -> Equilibrium:
+    def _ending(
+        self, q: Array, status: EquilibriumStatus, message: str, found: Root[Array] | None = None
+    ) -> Equilibrium:
         view = self.balance.look(q)
         e = view.evaluation
         at = self.marker_points.at(q)
-        balanced = status is not Held.FAILED and found is not None
+        balanced = status is not EquilibriumStatus.FAILED and found is not None
         rest = np.zeros_like(q)
         eigenvalues, levels, _ = self._eigen(q)
         react = partial(reactions_of, self.evaluator, q, rest, rest, self.time) if balanced else None

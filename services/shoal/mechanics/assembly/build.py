@@ -10,7 +10,7 @@ from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.assembly.loads import Loads, naming
 from shoal.mechanics.assembly.masses import Masses
 from shoal.mechanics.assembly.placement import place
-from shoal.mechanics.derived import Rows
+from shoal.mechanics.derived import RowAllocator
 from shoal.mechanics.least import principle
 from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import index, stacked
@@ -31,7 +31,7 @@ def with_start(model: Model, scene: Scene, lanes: int) -> Model:
         lanes=lanes,
         q0=stacked(placement.positions),
         v0=stacked(placement.velocities),
-        start_angles=stacked(Loads(scene, placement, Rows(0), 0.0).angles),
+        start_angles=stacked(Loads(scene, placement, RowAllocator(0), 0.0).angles),
     )
 
 
@@ -45,7 +45,7 @@ def build(scene: Scene, lanes: int = 1, horizon: float = 0.0, placement: Placeme
     placement = placement or place(scene)
     stated, scene = scene, placement.scene
     horizon = max(horizon, scene.solver.duration)
-    rows = Rows(len(placement.positions))
+    rows = RowAllocator(len(placement.positions))
     masses = Masses(scene, placement, rows)
     loads = Loads(scene, placement, rows, horizon)
     force_rows = rows.size

@@ -17,7 +17,7 @@ from shoal.mechanics.assembly.groups import start_angle
 from shoal.mechanics.assembly.rods import rod_axis
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
 from shoal.mechanics.assembly.space.hinges import axis_of, turning
-from shoal.mechanics.derived import Rows
+from shoal.mechanics.derived import RowAllocator
 from shoal.mechanics.forces import ANGLE, DISTANCE, PLACE, Forces
 from shoal.mechanics.frames import BeamFrame, ModalFrame, RigidFrame
 from shoal.mechanics.functions import Piecewise
@@ -72,7 +72,7 @@ def naming(field: str) -> Iterator[None]:
 class Loads:
     """Springs, dampers, joint friction, forces and torques."""
 
-    def __init__(self, scene: Scene, placement: Placement, rows: Rows, horizon: float) -> None:
+    def __init__(self, scene: Scene, placement: Placement, rows: RowAllocator, horizon: float) -> None:
         self.scene, self.placement, self.rows, self.horizon = scene, placement, rows, horizon
         self.fitted: list[Piecewise] = []
         self.kinds: list[int] = []

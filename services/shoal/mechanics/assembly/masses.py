@@ -10,7 +10,7 @@ from shoal.mechanics import plane
 from shoal.mechanics.affine import Affine
 from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.assembly.rods import rod_axis
-from shoal.mechanics.derived import Rows
+from shoal.mechanics.derived import RowAllocator
 from shoal.mechanics.elements import FAMILIES, SPATIAL_FAMILIES
 from shoal.mechanics.elements.families import Collected
 from shoal.mechanics.elements.unstrained import unstrained
@@ -20,7 +20,7 @@ from shoal.mechanics.numerics.tile import Array, Number
 from shoal.scene import GROUND, Body, RigidBody, Rod, Scene
 from shoal.scene.dimensions import padded
 
-LENT = np.array([1e-8, 1e-5])
+ADDED = np.array([1e-8, 1e-5])
 """Of the inertia of slope and director, which a further axis of a section has so that the mass matrix is positive.
 
 The first is for threads, whose constraints would seem dependent. Where an element is a thousand times as long as thick
@@ -32,11 +32,11 @@ Entries = dict[tuple[int, int], Number]
 class Masses:
     """Matrices as entries (row, column), row >= column, the weight by unknown, and the flexible elements.
 
-    mass: the mass matrix; lent: added mass of thin bodies, see `_lent`; flat: whether one of them is flat;
+    mass: the mass matrix; lent: added mass of thin bodies, see `_regularised`; flat: whether one of them is flat;
     stretching: of `Element.stretching`, of all rods, where their inertia is capped.
     """
 
-    def __init__(self, scene: Scene, placement: Placement, rows: Rows) -> None:
+    def __init__(self, scene: Scene, placement: Placement, rows: RowAllocator) -> None:
         self.scene, self.placement, self.rows = scene, placement, rows
         self.gravity = plane.vector(*padded(scene.gravity, scene.dimensions))
         self.mass: Entries = {}
@@ -103,7 +103,7 @@ class Masses:
         matrix = [[mass, *(mass * one for one in x)], *rows]
         vectors = [frame.origin, *frame.directors]
         _add(self.mass, vectors, matrix)
-        lent, flat = _lent(moments)
+        lent, flat = _regularised(moments)
         self.flat = self.flat or flat
         _add(self.lent, list(frame.directors), lent)
         self._add_load(vectors, matrix[0])
@@ -124,7 +124,7 @@ class Masses:
             self._add_load(vectors, weight)
             for (node, _), vector in frame.axes.items():
                 if node in (number, number + 1):
-                    lent = sum(share * masses[k][k] for share, k in zip(LENT, (-2, -1), strict=True))
+                    lent = sum(share * masses[k][k] for share, k in zip(ADDED, (-2, -1), strict=True))
                     _add(self.mass, [vector], [[lent]])
             part = element.part(rod, section, length, nodes[number] + nodes[number + 1])
             self.families[element.family].add(name, self.rows.of_all(vectors), part)
@@ -186,7 +186,7 @@ def second_moments(body: Rod | RigidBody) -> list[list[Number]]:
     return matrix
 
 
-def _lent(matrix: list[list[Number]]) -> tuple[list[list[Number]], bool]:
+def _regularised(matrix: list[list[Number]]) -> tuple[list[list[Number]], bool]:
     """Regularise the mass of a thin body: the added second moment across its plane [kg m^2], and whether it is flat.
 
     The motion of the director there follows from the other two. Without inertia of its own, constraints on it would be

@@ -24,7 +24,8 @@ from shoal.mechanics.model import Arrays, Model
 from shoal.mechanics.numerics.tile import Array, Tile
 from shoal.scene import Solver
 
-ROUND_OFF = 1e-15
+NOISE = 1e-15
+"""Relative round-off of an energy: four to five rounding errors."""
 
 
 class EnergyMomentum(NamedTuple):
@@ -83,7 +84,7 @@ def mean_force(tile: Tile, scheme: EnergyMomentum, m: Arrays, w: Work, t: float,
             square += w.stage[i] * change[i]
         after = w.energy[width + lane]
         excess = after - scheme.elastic[lane] + work
-        noise = ROUND_OFF * (abs(after) + abs(scheme.elastic[lane]))
+        noise = NOISE * (abs(after) + abs(scheme.elastic[lane]))
         factor = excess / square if abs(excess) > noise and square > 0 else 0.0
         for i in range(lane, end, width):
             f[i] -= factor * w.stage[i]

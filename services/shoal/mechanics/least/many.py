@@ -86,7 +86,7 @@ def _combine(tile: Tile, c: Constraints, w: GaussWork, number: int, lane: int, s
 def _add_dropped(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array, a: Array) -> None:
     """Correct `a` by a row for each that the factorisation left out, one after the other.
 
-    Where branches of the motion cross it is u' d3C/dt3 = 0, else u' d2C/dt2 = 0, with what is left of u' C_q.
+    Where branches of the motion cross it is u' d3C/dt3 = 0, else u' d2C/dt2 = 0, with the remainder of u' C_q.
     """
     width = len(tile)
     c = m.constraints

@@ -1,7 +1,7 @@
 """Vectors along the axes of a rod's section that joints need at a node, besides its slope and director.
 
 A joint asks for a direction: the slope is one, whose length is free, and the director, a unit vector. Others are made
-when first asked for, with a small inertia (`masses.LENT`): the section's third axis, at right angles to both, and the
+when first asked for, with a small inertia (`masses.ADDED`): the section's third axis, at right angles to both, and the
 unit tangent, at right angles to the others.
 """
 

@@ -246,11 +246,11 @@ class _Start:
 
     def _mass(self, lane: int) -> Array:
         from shoal.mechanics.assembly.masses import Masses
-        from shoal.mechanics.derived import Rows
+        from shoal.mechanics.derived import RowAllocator
 
         count = len(self.q)
         matrix = np.zeros((count, count))
-        for (i, j), value in Masses(self.scene, self.placement, Rows(count)).mass.items():
+        for (i, j), value in Masses(self.scene, self.placement, RowAllocator(count)).mass.items():
             matrix[i, j] = matrix[j, i] = np.ravel(value)[min(lane, np.size(value) - 1)]
         return matrix
 
