@@ -13,7 +13,7 @@ from shoal.engines import get_engine
 from shoal.identification import Estimate, Measurement, Problem
 from shoal.identification.conclude import NOTHING, conclude
 from shoal.identification.forward import ForwardModel
-from shoal.identification.judge.other_laws import OtherLaw, sentences
+from shoal.identification.judge.other_laws import OtherLaw, wider_by_other_laws
 from shoal.identification.methods import get_method
 from shoal.identification.spread.value import Value
 from shoal.scene import Scene
@@ -119,8 +119,8 @@ def test_an_interval_goes_from_the_lowest_to_the_highest(others: list[tuple[str,
 
     there = {field: value(centre, half) for field, centre, half in others}
     laws = [OtherLaw("c", "O", field, False, np.zeros(1)) for field in there]
-    found = sentences(laws, {"c": value(1.0, 0.1)}, lambda law: there[law.field])
-    assert "".join(found).endswith(told)
+    found = wider_by_other_laws(laws, {"c": value(1.0, 0.1)}, lambda law: there[law.field])
+    assert "".join(one.text for one in found).endswith(told)
     assert bool(found) == bool(told)
 
 
