@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import doctest
 import inspect
 import subprocess
 import sys
@@ -121,6 +122,19 @@ def test_the_forms_have_the_fields() -> None:
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-2000:]
     assert len(done.stdout.split()) == 8
+
+
+FREE = [name for name in shoal.__all__ if inspect.isfunction(getattr(shoal, name)) and name not in ("plot", "identify")]
+
+
+@pytest.mark.parametrize("name", FREE)
+def test_every_function_says_what_it_returns_by_an_example_that_runs(name: str) -> None:
+    text = getattr(shoal, name).__doc__
+    assert "Returns:" in text
+    example = doctest.DocTestParser().get_doctest(text, {"shoal": shoal}, name, None, 0)
+    assert example.examples
+    if name != "select":  # which takes seconds
+        assert doctest.DocTestRunner().run(example).failed == 0
 
 
 def test_a_new_option_is_one_line() -> None:

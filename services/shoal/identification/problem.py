@@ -326,7 +326,15 @@ def problem_library() -> Traversable:
 
 
 def problem_names() -> list[str]:
-    """Names of the built-in problems, then those of one's own library, sorted each."""
+    """List the problems that there are.
+
+    Returns:
+        The names of built-in problems, then of the user library, each sorted.
+
+    Examples:
+        >>> "paper-case-1" in shoal.problem_names()
+        True
+    """
     return [*built_in_problems(), *(entry.name for entry in shelf().entries("problems"))]
 
 
@@ -352,9 +360,20 @@ def as_problem(given: Problem | Mapping[str, Any] | str | Path) -> Problem:
 
 
 def load_problem(name: str | Path) -> Problem:
-    """The problem of that name, built-in or of one's own library, or the one in that YAML file. Raises InputError.
+    """Load a problem of identification.
 
-    What a YAML file names is beside it, or a name of the library.
+    Args:
+        name: A built-in name, one of the user library, or a YAML file; what this names is beside it, or in the library.
+
+    Returns:
+        The problem.
+
+    Raises:
+        InputError: There is no such problem, or a field of it is wrong.
+
+    Examples:
+        >>> list(shoal.load_problem("paper-case-1").parameters)
+        ['theta1', 'theta2']
     """
     name = str(name)
     name = name if name in built_in_problems() else located("problems", name)

@@ -171,7 +171,15 @@ def scene_library() -> Traversable:
 
 
 def scene_names() -> list[str]:
-    """Return the names of built-in scenes (of parametric ones the examples), then of the user library, each sorted."""
+    """List the scenes that there are.
+
+    Returns:
+        The names of built-in scenes (of parametric ones the examples), then of the user library, each sorted.
+
+    Examples:
+        >>> "single-pendulum" in shoal.scene_names()
+        True
+    """
     return [*built_in_scenes(), *(entry.name for entry in shelf().entries("scenes"))]
 
 
@@ -195,9 +203,20 @@ def as_scene(given: Scene | Mapping[str, Any] | str | Path) -> Scene:
 
 
 def load_scene(name: str | Path) -> Scene:
-    """Load a scene by its name, built-in or in the user library, or from a YAML file. Raises InputError.
+    """Load a scene.
 
-    NAME@VERSION is an earlier version of the library's.
+    Args:
+        name: A built-in name, one of the user library (NAME@VERSION is an earlier version), or a YAML file.
+
+    Returns:
+        The scene; whoever edits it edits no other.
+
+    Raises:
+        InputError: There is no such scene, or a field of it is wrong.
+
+    Examples:
+        >>> list(shoal.load_scene("single-pendulum").markers)
+        ['A']
     """
     name = str(name)
     if (data := parametric(name)) is not None:
