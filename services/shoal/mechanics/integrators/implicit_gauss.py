@@ -4,8 +4,9 @@ v+ = argmin 1/2 |v - v~|_M^2 + U(q + h v) subject to C(q + h v) = 0, where v~ = 
 of the free motion and U the elastic energy. Its stationarity is M (v+ - v)/h + C_q' lambda = Q(q + h v+, v+):
 backward Euler with position constraints. Newton's quadratic model has the metric M + h D + h^2 K.
 
-It loses energy at the rate h a'Ma / 2, which its energy balance shows: forces and drives are counted with the mean
-rates of the step, by which the kinetic energy changes, so that nothing but this loss is left.
+It loses energy at the rate h (a'Q / 2 + lambda'C_qq v v), h a'Ma / 2 where nothing is constrained, which its energy
+balance shows: forces and drives are counted with the mean rates of the step, by which the kinetic energy changes, so
+that nothing but this loss is left.
 """
 
 from __future__ import annotations
