@@ -18,7 +18,7 @@ from shoal.notebook import uncertain
 from shoal.response.allocation import Allocation, cheapest, with_factors
 from shoal.response.allocation_of_random import Confirmed, Cut
 from shoal.response.allocation_of_random import cheapest as within
-from shoal.response.inputs import Inputs, Parameter
+from shoal.response.inputs import Inputs, UncertainParameter
 from shoal.response.limits.estimate import ExceedanceEstimate
 from shoal.response.marginals import Frozen, Interval, Normal, Scaled, Uniform
 from shoal.response.worst import worst
@@ -325,7 +325,7 @@ def test_what_cannot_be_allocated_is_refused() -> None:
 )
 def test_scaled_tolerances(marginal: Interval | Normal | Frozen) -> None:
     """Half the width about the same middle."""
-    inputs = Inputs((Parameter("x", marginal, {"x": 1.0}),))
+    inputs = Inputs((UncertainParameter("x", marginal, {"x": 1.0}),))
     half = with_factors(inputs, np.array([0.5])).parameters[0].marginal
     assert isinstance(half, Scaled) is isinstance(marginal, Frozen)
     x = np.array([0.1, 0.5, 0.9])

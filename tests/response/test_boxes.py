@@ -18,7 +18,7 @@ from shoal.errors import InputError
 from shoal.notebook import uncertain
 from shoal.pictures import files
 from shoal.response import Response, respond
-from shoal.response.inputs import Inputs, Parameter
+from shoal.response.inputs import Inputs, UncertainParameter
 from shoal.response.marginals import Frozen, Interval, Normal, Uniform
 from shoal.response.runs import Answers
 from shoal.response.statistics import QUANTILES
@@ -66,7 +66,9 @@ def test_an_oscillator_with_a_spring_known_within_bounds() -> None:
     c = cos(sqrt(k) t), whose range over k follows from where sqrt(k) t is a multiple of pi / 2.
     """
     t = np.array([0.0, 1.0, 5.0, 10.0, 20.0])
-    known = Inputs((Parameter("k", Interval(0.9, 1.1), {"k": 1.0}), Parameter("x", Normal(1.0, 0.1), {"x": 1.0})))
+    known = Inputs(
+        (UncertainParameter("k", Interval(0.9, 1.1), {"k": 1.0}), UncertainParameter("x", Normal(1.0, 0.1), {"x": 1.0}))
+    )
     swings = model(lambda v: v["x"][:, None] * np.cos(np.sqrt(v["k"])[:, None] * t))
     answer = respond(swings, known, len(t), groups=np.zeros(len(t), dtype=int), instants=t)
     low, high = np.sqrt(0.9) * t, np.sqrt(1.1) * t
@@ -104,7 +106,7 @@ def test_an_oscillator_with_a_spring_known_within_bounds() -> None:
 def test_indices_between_bounds() -> None:
     """y = k a + b + a b with normal a, b: of the variance k^2 + 2, a alone has k^2, and takes part in k^2 + 1."""
     known = {"k": Interval(0.5, 2.0), "a": Normal(0.0, 1.0), "b": Normal(0.0, 1.0)}
-    given = Inputs(tuple(Parameter(name, of, {name: 1.0}) for name, of in known.items()))
+    given = Inputs(tuple(UncertainParameter(name, of, {name: 1.0}) for name, of in known.items()))
     answer = respond(model(lambda v: (v["k"] * v["a"] + v["b"] + v["a"] * v["b"])[:, None]), given, 1)
     found = answer.boxes
     assert found is not None
@@ -139,7 +141,7 @@ def test_random_studies_against_brute_force(seed: int) -> None:
     known = [Interval(-1.0, 1.0)] * intervals + [
         Normal(0.0, 1.0) if kind is DISTRIBUTIONS[0] else Frozen(kind) for kind in kinds
     ]
-    inputs = Inputs(tuple(Parameter(f"p{k}", one, {f"p{k}": 1.0}) for k, one in enumerate(known)))
+    inputs = Inputs(tuple(UncertainParameter(f"p{k}", one, {f"p{k}": 1.0}) for k, one in enumerate(known)))
     stack = model(lambda v: told(np.stack([v[f"p{k}"] for k in range(count)], axis=1)))
     answer = respond(stack, inputs, 3, seed=seed)
     found = answer.boxes
@@ -166,8 +168,11 @@ def test_random_studies_against_brute_force(seed: int) -> None:
 
 def test_correlation_beside_an_interval() -> None:
     """Deviation of k (x + y): k sqrt(1 + 4 + 2 * 2 * 0.5)."""
-    pair = (Parameter("x", Normal(0.0, 1.0), {"x": 1.0}), Parameter("y", Normal(0.0, 2.0), {"y": 1.0}))
-    known = Inputs((pair[0], Parameter("k", Interval(1.0, 3.0), {"k": 1.0}), pair[1]), {("x", "y"): 0.5})
+    pair = (
+        UncertainParameter("x", Normal(0.0, 1.0), {"x": 1.0}),
+        UncertainParameter("y", Normal(0.0, 2.0), {"y": 1.0}),
+    )
+    known = Inputs((pair[0], UncertainParameter("k", Interval(1.0, 3.0), {"k": 1.0}), pair[1]), {("x", "y"): 0.5})
     found = respond(model(lambda v: (v["k"] * (v["x"] + v["y"]))[:, None]), known, 1).boxes
     assert found is not None
     assert (found.std.lower[0], found.std.upper[0]) == pytest.approx((math.sqrt(7), 3 * math.sqrt(7)))
@@ -187,7 +192,12 @@ def test_beyond_the_horizon_runs_tell() -> None:
                 kept.append(x)
         return np.stack(kept, axis=1)
 
-    known = Inputs((Parameter("k", Interval(-0.1, 0.1), {"k": 1.0}), Parameter("x", Uniform(-0.1, 0.1), {"x": 1.0})))
+    known = Inputs(
+        (
+            UncertainParameter("k", Interval(-0.1, 0.1), {"k": 1.0}),
+            UncertainParameter("x", Uniform(-0.1, 0.1), {"x": 1.0}),
+        )
+    )
     answer = respond(model(steps), known, 2, instants=np.array([1.0, 40.0]))
     found = answer.boxes
     assert found is not None

@@ -13,7 +13,7 @@ from click.testing import CliRunner
 from shoal.cli import main
 from shoal.response import respond
 from shoal.response.control import COUNT, unseen
-from shoal.response.inputs import Inputs, Parameter
+from shoal.response.inputs import Inputs, UncertainParameter
 from shoal.response.marginals import Interval
 from shoal.response.runs import Answers
 from sliding import puck
@@ -24,7 +24,7 @@ from sliding import puck
 @pytest.mark.parametrize(("place", "share"), [(0.31, 0.06), (-0.72, 0.05), (0.38, 0.12)])
 def test_a_band_between_runs_is_not_passed_over(place: float, share: float, count: int, method: str) -> None:
     """A straight line, but for a band of 5 to 12 % of the first interval, where the answer is lower by two."""
-    inputs = Inputs(tuple(Parameter(f"p{k}", Interval(-1.0, 1.0), {f"p{k}": 1.0}) for k in range(count)))
+    inputs = Inputs(tuple(UncertainParameter(f"p{k}", Interval(-1.0, 1.0), {f"p{k}": 1.0}) for k in range(count)))
 
     def answers(values: dict[str, np.ndarray]) -> Answers:
         hit = np.abs(values["p0"] - place) < share
@@ -41,7 +41,7 @@ def test_a_band_between_runs_is_not_passed_over(place: float, share: float, coun
 @pytest.mark.parametrize("count", [1, 2, 4])
 def test_what_is_smooth_is_told_as_before(count: int, seed: int) -> None:
     """A plane and a wave: bounds meet, and what the runs of control cost is told apart."""
-    inputs = Inputs(tuple(Parameter(f"p{k}", Interval(-1.0, 1.0), {f"p{k}": 1.0}) for k in range(count)))
+    inputs = Inputs(tuple(UncertainParameter(f"p{k}", Interval(-1.0, 1.0), {f"p{k}": 1.0}) for k in range(count)))
 
     def answers(values: dict[str, np.ndarray]) -> Answers:
         told = sum((k + 1) * x for k, x in enumerate(values.values()))

@@ -7,7 +7,7 @@ import pytest
 from numpy.polynomial import hermite_e, legendre
 from scipy.special import factorial
 from shoal.response.expansion import Expansion
-from shoal.response.inputs import Inputs, Parameter
+from shoal.response.inputs import Inputs, UncertainParameter
 from shoal.response.marginals import Interval, Normal
 from shoal.response.polynomials import total_degree
 
@@ -25,7 +25,7 @@ def _alone(kind: object, germs: np.ndarray, degree: int) -> np.ndarray:
 @pytest.mark.parametrize("names", ["a", "b", "ac", "abc", "bab"])
 def test_products_are_those_of_numpys_series(names: str) -> None:
     kinds = [MIXED[name] for name in names]
-    inputs = Inputs(tuple(Parameter(f"p{k}", kind, {f"p{k}": 1.0}) for k, kind in enumerate(kinds)))
+    inputs = Inputs(tuple(UncertainParameter(f"p{k}", kind, {f"p{k}": 1.0}) for k, kind in enumerate(kinds)))
     terms = total_degree(len(kinds), 3)
     random = np.random.default_rng(1)
     germs, coefficients = random.uniform(-1, 1, (50, len(kinds))), random.normal(size=(len(terms), 4))
@@ -40,7 +40,7 @@ def test_products_are_those_of_numpys_series(names: str) -> None:
 
 
 def test_a_constant_has_no_polynomials() -> None:
-    inputs = Inputs((Parameter("p", MIXED["a"], {"p": 1.0}),))
+    inputs = Inputs((UncertainParameter("p", MIXED["a"], {"p": 1.0}),))
     found = Expansion(inputs, total_degree(1, 0), np.array([[2.0, 3.0]]), np.zeros(2))
     germs = np.linspace(-1, 1, 5)[:, None]
     assert found(germs).tolist() == [[2.0, 3.0]] * 5

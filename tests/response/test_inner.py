@@ -10,9 +10,9 @@ from numpy.polynomial.hermite_e import hermegauss
 from scipy import stats
 from scipy.stats import qmc
 from shoal.response import respond
-from shoal.response.inputs import Inputs, Parameter
+from shoal.response.inputs import Inputs, UncertainParameter
 from shoal.response.marginals import Interval, Normal
-from shoal.response.respond import Answer
+from shoal.response.respond import ModelResponse
 from shoal.response.runs import Answers
 from shoal.response.statistics import QUANTILES
 from shoal.trajectory import Array
@@ -33,12 +33,12 @@ def chain(values: Values, t: Array) -> Array:
     return np.asarray(np.einsum("rj,rjt->rt", amplitudes, np.cos(np.sqrt(squares)[..., None] * t)))
 
 
-def told(function: Callable[[Values], Array], known: Mapping[str, Interval | Normal], **limits: int) -> Answer:
+def told(function: Callable[[Values], Array], known: Mapping[str, Interval | Normal], **limits: int) -> ModelResponse:
     def model(values: Values) -> Answers:
         found = function(values)
         return Answers(found, np.ones(len(found), dtype=bool))
 
-    inputs = Inputs(tuple(Parameter(name, one, {name: 1.0}) for name, one in known.items()))
+    inputs = Inputs(tuple(UncertainParameter(name, one, {name: 1.0}) for name, one in known.items()))
     columns = function({name: np.ones(1) for name in known}).shape[1]
     when = np.arange(1.0, columns + 1)
     return respond(model, inputs, columns, groups=np.zeros(columns, dtype=int), instants=when, **limits)
@@ -63,7 +63,7 @@ def moments(
     return mean, np.sqrt(np.einsum("j,ijk->ik", weight, (answers - mean[:, None]) ** 2))
 
 
-def judge(answer: Answer, mean: Array, deviation: Array) -> None:
+def judge(answer: ModelResponse, mean: Array, deviation: Array) -> None:
     """Attained extremes within a few per cent of the largest at each instant, true ones within outer bounds."""
     found, grid = answer.boxes, 2e-3
     assert found is not None

@@ -10,7 +10,7 @@ from shoal.errors import ComputationError, InputError
 from shoal.notebook import uncertain
 from shoal.response import Response
 from shoal.response.kept import Keep
-from shoal.response.machine import Machine
+from shoal.response.machine import ResponseModel
 from shoal.scene import Scene
 from thrown import ALONG, THROWN, UP
 
@@ -29,28 +29,28 @@ def test_a_study_that_was_broken_off_goes_on(tmp_path: Path, monkeypatch: pytest
     """Killed in the middle of a limit, half of its last runs written: the answer is that of one that was not."""
     how: dict[str, Any] = {"limit": ["P.y > 1.75"], "limit_runs": 1500}
     whole, file = study(RANDOM, **how), tmp_path / "runs"
-    made, original = [0], Machine._some
+    made, original = [0], ResponseModel._some
 
-    def some(machine: Machine, values: Any) -> Any:
+    def some(machine: ResponseModel, values: Any) -> Any:
         made[0] += 1
         if made[0] == 12:
             raise KeyboardInterrupt
         return original(machine, values)
 
     with monkeypatch.context() as broken:
-        broken.setattr(Machine, "_some", some)
+        broken.setattr(ResponseModel, "_some", some)
         with pytest.raises(KeyboardInterrupt):
             study(RANDOM, checkpoint=file, **how)
     file.write_bytes(file.read_bytes()[:-7])
     made[0] = -1000
     with monkeypatch.context() as counted:
-        counted.setattr(Machine, "_some", some)
+        counted.setattr(ResponseModel, "_some", some)
         again = study(RANDOM, checkpoint=file, **how)
     assert told(again) == told(whole)
     first = made[0]
     made[0] = -1000
     with monkeypatch.context() as counted:
-        counted.setattr(Machine, "_some", some)
+        counted.setattr(ResponseModel, "_some", some)
         assert told(study(RANDOM, checkpoint=file, **how)) == told(whole)
     assert made[0] == -1000
     assert first > -1000

@@ -12,7 +12,7 @@ from scipy import stats
 from shoal.cli import main
 from shoal.errors import InputError
 from shoal.notebook import uncertain
-from shoal.response.inputs import Inputs, Parameter
+from shoal.response.inputs import Inputs, UncertainParameter
 from shoal.response.limits.choice import WAYS, probability
 from shoal.response.limits.estimate import weighted
 from shoal.response.limits.form import design_points
@@ -166,7 +166,10 @@ def test_failed_runs_widen_the_interval() -> None:
 
 def test_other_distributions_are_brought_to_normal_ones() -> None:
     """x uniform, y exponential: P(x + y > 12), x in [0, 1], mean of y 1, is (e - 1) exp(-12)."""
-    pair = Parameter("x", Uniform(0.0, 1.0), {"x": 1.0}), Parameter("y", Frozen(stats.expon()), {"y": 1.0})
+    pair = (
+        UncertainParameter("x", Uniform(0.0, 1.0), {"x": 1.0}),
+        UncertainParameter("y", Frozen(stats.expon()), {"y": 1.0}),
+    )
 
     def model(values: dict[str, Array]) -> Answers:
         return Answers(12 - values["x"][:, None] - values["y"][:, None], np.ones(len(values["x"]), dtype=bool))

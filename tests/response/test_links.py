@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy import stats
 from shoal.response import respond
-from shoal.response.inputs import Inputs, Parameter
+from shoal.response.inputs import Inputs, UncertainParameter
 from shoal.response.marginals import Marginal, Normal, Uniform
-from shoal.response.respond import Answer
+from shoal.response.respond import ModelResponse
 from shoal.response.runs import Answers
 from shoal.response.statistics import QUANTILES
 from shoal.trajectory import Array
@@ -19,10 +19,10 @@ from shoal.trajectory import Array
 COUNT = 8
 
 
-def answered(marginal: Marginal, *functions: object, seed: int = 0) -> Answer:
+def answered(marginal: Marginal, *functions: object, seed: int = 0) -> ModelResponse:
     """Of functions of eight parameters, (parameters, runs) to (runs,)."""
     names = [f"x{k}" for k in range(COUNT)]
-    inputs = Inputs(tuple(Parameter(name, marginal, {name: 1.0}) for name in names))
+    inputs = Inputs(tuple(UncertainParameter(name, marginal, {name: 1.0}) for name in names))
 
     def model(values: Mapping[str, Array]) -> Answers:
         x = np.stack([values[name] for name in names])
@@ -32,7 +32,7 @@ def answered(marginal: Marginal, *functions: object, seed: int = 0) -> Answer:
     return respond(model, inputs, len(functions), seed=seed)
 
 
-def holds(answer: Answer, column: int, mean: float, std: float) -> None:
+def holds(answer: ModelResponse, column: int, mean: float, std: float) -> None:
     """Within 1e-3 and within what is told, with 300 runs."""
     found = answer.statistics
     assert found is not None

@@ -10,9 +10,9 @@ import pytest
 from shoal.errors import InputError
 from shoal.notebook import uncertain
 from shoal.response import respond
-from shoal.response.inputs import Inputs, Parameter
+from shoal.response.inputs import Inputs, UncertainParameter
 from shoal.response.marginals import Interval
-from shoal.response.respond import Answer
+from shoal.response.respond import ModelResponse
 from shoal.response.runs import Answers
 from shoal.scene import Scene
 from shoal.trajectory import Array
@@ -33,7 +33,7 @@ def three(u: Array, times: Array) -> Array:
     return np.asarray(two(u, times) + 0.5 * np.sin(np.cos(4.711 * (1 + 0.01 * u[:, 0]) * times) + 1))
 
 
-def asked(motion: Motion, parameters: int, times: Array, method: str = "auto", **options: float) -> Answer:
+def asked(motion: Motion, parameters: int, times: Array, method: str = "auto", **options: float) -> ModelResponse:
     problem, count = Problem("motion", parameters, tuple(times), motion), len(times)
     one, at = np.zeros(count, dtype=int), problem.at
     return respond(at(times), problem.inputs, count, method=method, groups=one, instants=times, over_time=at, **options)
@@ -118,7 +118,7 @@ def test_what_no_method_of_cycles_suits_is_refused() -> None:
 
 def test_methods_of_cycles_need_a_course() -> None:
     model = Answers(np.zeros((1, 1)), np.ones(1, dtype=bool))
-    known = Inputs((Parameter("u", Interval(0.0, 1.0), {"u": 1.0}),))
+    known = Inputs((UncertainParameter("u", Interval(0.0, 1.0), {"u": 1.0}),))
     with pytest.raises(InputError, match="at its instants only"):
         respond(lambda _: model, known, 1, method="torus")
 

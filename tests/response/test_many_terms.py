@@ -11,7 +11,7 @@ from scipy.optimize import approx_fprime
 from shoal.response import regularised, respond
 from shoal.response.expansion import fit
 from shoal.response.extremes import IntArray, extremes
-from shoal.response.inputs import Inputs, Parameter
+from shoal.response.inputs import Inputs, UncertainParameter
 from shoal.response.marginals import Interval
 from shoal.response.polynomials import total_degree
 from shoal.response.runs import Answers
@@ -22,7 +22,7 @@ TURNS = np.array([0.9, 0.5, 0.4, 0.3, 0.2, 0.1])
 
 
 def box(parameters: int) -> Inputs:
-    return Inputs(tuple(Parameter(f"x{k}", Interval(-1.0, 1.0), {f"x{k}": 1.0}) for k in range(parameters)))
+    return Inputs(tuple(UncertainParameter(f"x{k}", Interval(-1.0, 1.0), {f"x{k}": 1.0}) for k in range(parameters)))
 
 
 @pytest.mark.slow

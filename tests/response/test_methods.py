@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 from shoal.response import respond
-from shoal.response.inputs import Inputs, Parameter
+from shoal.response.inputs import Inputs, UncertainParameter
 from shoal.response.marginals import Interval, Normal
 from shoal.response.methods import get_method
 from shoal.response.methods.chebyshev_sparse import sparse_grid
@@ -27,7 +27,7 @@ def made(method: str, function: object, parameters: int, **wanted: int | None) -
         found = function(np.stack([values[name] for name in names], axis=1))[:, None]  # type: ignore[operator]
         return Answers(found, np.ones(len(found), dtype=bool))
 
-    inputs = Inputs(tuple(Parameter(name, Interval(-1.0, 1.0), {name: 1.0}) for name in names))
+    inputs = Inputs(tuple(UncertainParameter(name, Interval(-1.0, 1.0), {name: 1.0}) for name in names))
     runs = CachedModel(model, inputs, 20_000)
     found = get_method(method)(Study(runs, np.zeros(1, dtype=np.int64), np.zeros(1), **wanted))  # type: ignore[arg-type]
     return found, runs
@@ -142,7 +142,7 @@ def test_the_method_of_greatest_entropy_tells_statistics() -> None:
         found = np.exp(0.2 * values["u"])[:, None] * np.array([1.0, 0.0])
         return Answers(found, np.ones(len(found), dtype=bool))
 
-    known = Inputs((Parameter("u", Normal(0.0, 1.0), {"u": 1.0}),))
+    known = Inputs((UncertainParameter("u", Normal(0.0, 1.0), {"u": 1.0}),))
     found = respond(model, known, 2, method="maximum-entropy", count=512).statistics
     assert found is not None
     assert found.quantiles[:, 0] == pytest.approx(stats.lognorm(0.2).ppf(QUANTILES), rel=0.03)

@@ -12,7 +12,7 @@ from SALib.analyze import sobol as indices
 from SALib.sample import sobol as saltelli
 from scipy import stats
 from shoal.response import respond
-from shoal.response.inputs import Inputs, Parameter
+from shoal.response.inputs import Inputs, UncertainParameter
 from shoal.response.marginals import Empirical, Frozen, Interval, Marginal, Normal, Uniform
 from shoal.response.runs import Answers
 from shoal.trajectory import Array
@@ -29,7 +29,7 @@ def model(function: Function) -> Callable[[Mapping[str, Array]], Answers]:
 
 
 def inputs(*known: Marginal) -> Inputs:
-    return Inputs(tuple(Parameter(name, one, {name: 1.0}) for name, one in zip("abc", known, strict=True)))
+    return Inputs(tuple(UncertainParameter(name, one, {name: 1.0}) for name, one in zip("abc", known, strict=True)))
 
 
 def function(a: Array, b: Array, c: Array) -> Array:

@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 from scipy import integrate, stats
 from shoal.response import respond
-from shoal.response.inputs import Inputs, Parameter
+from shoal.response.inputs import Inputs, UncertainParameter
 from shoal.response.marginals import Frozen, Marginal, Normal, Uniform
 from shoal.response.methods.quadrature import gauss, quadrature
 from shoal.response.polynomials import HERMITE
-from shoal.response.respond import Answer
+from shoal.response.respond import ModelResponse
 from shoal.response.runs import Answers, CachedModel
 from shoal.response.study import Study
 from shoal.trajectory import Array
 
 
-def asked(function: Callable[..., Array], *known: Marginal, limit: float = np.inf) -> Answer:
+def asked(function: Callable[..., Array], *known: Marginal, limit: float = np.inf) -> ModelResponse:
     names = "xy"[: len(known)]
 
     def model(values: Mapping[str, Array]) -> Answers:
@@ -27,7 +27,7 @@ def asked(function: Callable[..., Array], *known: Marginal, limit: float = np.in
         good = np.all(np.abs(given) < limit, axis=0)
         return Answers(function(*given)[:, None], good)
 
-    inputs = Inputs(tuple(Parameter(name, one, {name: 1.0}) for name, one in zip(names, known, strict=True)))
+    inputs = Inputs(tuple(UncertainParameter(name, one, {name: 1.0}) for name, one in zip(names, known, strict=True)))
     return respond(model, inputs, 1)
 
 
@@ -96,7 +96,7 @@ def test_two_parameters() -> None:
 
 def test_what_is_not_smooth_is_left_to_others() -> None:
     """A step, and a band that few points meet: drawn runs see both."""
-    inputs = Inputs((Parameter("x", Normal(0.0, 1.0), {"x": 1.0}),))
+    inputs = Inputs((UncertainParameter("x", Normal(0.0, 1.0), {"x": 1.0}),))
     for function in (lambda x: 1.0 * (x > 0.4), lambda x: x + 1.0 * (np.abs(x - 0.31) < 0.08)):
 
         def model(values: Mapping[str, Array], function: Callable[[Array], Array] = function) -> Answers:

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 from shoal.cli import main
 from shoal.errors import InputError
 from shoal.notebook import uncertain
-from shoal.response.inputs import Inputs, Parameter
+from shoal.response.inputs import Inputs, UncertainParameter
 from shoal.response.limits import limit, read_limits, requirement
 from shoal.response.marginals import Interval, Normal
 from shoal.response.worst import require_case
@@ -54,7 +54,7 @@ def test_one_text_cannot_be_both() -> None:
 )
 def test_a_wrong_worst_case_is_refused_before_the_study(of: str, known: Interval | Normal, says: str) -> None:
     with pytest.raises(InputError, match=says):
-        require_case(of, [], SCENE, Inputs((Parameter(UP, known, {UP: 1.0}),)).parameters)
+        require_case(of, [], SCENE, Inputs((UncertainParameter(UP, known, {UP: 1.0}),)).parameters)
 
 
 @pytest.mark.parametrize("known", ["normal(5,0.2)", "uniform(4.7,5.3)", (4.7, 5.3)])

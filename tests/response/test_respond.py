@@ -11,7 +11,7 @@ from scipy import stats
 from shoal.errors import ComputationError, InputError
 from shoal.response import respond
 from shoal.response.climb import IntArray
-from shoal.response.inputs import Inputs, Parameter
+from shoal.response.inputs import Inputs, UncertainParameter
 from shoal.response.marginals import Empirical, Frozen, Interval, Marginal, Normal, Uniform
 from shoal.response.methods import METHODS
 from shoal.response.runs import Answers, Model
@@ -32,7 +32,7 @@ def model(function: Callable[[Mapping[str, Array]], Array]) -> Model:
 
 
 def inputs(**known: Marginal) -> Inputs:
-    return Inputs(tuple(Parameter(name, marginal, {name: 1.0}) for name, marginal in known.items()))
+    return Inputs(tuple(UncertainParameter(name, marginal, {name: 1.0}) for name, marginal in known.items()))
 
 
 def oscillates(instants: Array) -> Model:
@@ -209,7 +209,10 @@ def test_moments_of_a_square(known: Marginal) -> None:
 
 def test_correlation_of_two_normal_parameters() -> None:
     """Var(x + y) = 1 + 4 + 2 * 2 * 0.5."""
-    pair = (Parameter("x", Normal(0.0, 1.0), {"x": 1.0}), Parameter("y", Normal(0.0, 2.0), {"y": 1.0}))
+    pair = (
+        UncertainParameter("x", Normal(0.0, 1.0), {"x": 1.0}),
+        UncertainParameter("y", Normal(0.0, 2.0), {"y": 1.0}),
+    )
     known = Inputs(pair, {("x", "y"): 0.5})
     answer = respond(model(lambda v: (v["x"] + v["y"])[:, None]), known, 1)
     assert answer.statistics is not None

@@ -13,7 +13,7 @@ from shoal import simulate
 from shoal.engines import get_engine
 from shoal.errors import InputError
 from shoal.notebook import uncertain
-from shoal.response.machine import Machine
+from shoal.response.machine import ResponseModel
 from shoal.scene import Scene
 from shoal.trajectory import Status
 
@@ -122,7 +122,7 @@ def test_a_run_that_another_integrator_can_make() -> None:
     values = {"loads.k.stiffness": np.array([stiffness, stiffness + 1e-3])}
     engine = get_engine("gauss")
     assert engine.simulate_many(scene, values, [end]).status[0] is Status.DIVERGED
-    answers = Machine(scene, np.array([end]), engine)(values)
+    answers = ResponseModel(scene, np.array([end]), engine)(values)
     assert answers.good.all()
     assert answers.repeated == 1
     assert answers.values[0, 0] == pytest.approx(found.y[0, -1], abs=1e-6)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from scipy import fft, optimize, stats
-from shoal.response.inputs import Inputs, Parameter
+from shoal.response.inputs import Inputs, UncertainParameter
 from shoal.response.limits.choice import Passing, probability
 from shoal.response.limits.margins import Margins
 from shoal.response.marginals import Normal
@@ -52,7 +52,7 @@ class Sum:
             return Answers(self.bound - total[:, None], np.ones(len(total), dtype=bool))
 
         known = [
-            Parameter(name, Normal(float(mean), float(deviation), logarithmic=logarithmic), {name: 1.0})
+            UncertainParameter(name, Normal(float(mean), float(deviation), logarithmic=logarithmic), {name: 1.0})
             for name, mean, deviation in zip(names, self.means, self.deviations, strict=True)
         ]
         return probability(Margins(model, Inputs(tuple(known)), 5000), "auto", seed)

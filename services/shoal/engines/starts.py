@@ -58,7 +58,7 @@ class Elsewhere:
 
 
 @dataclass(frozen=True)
-class Stated:
+class StatedStart:
     """Stated values of the start of a scene that are no guesses, with which starts of runs are compared.
 
     values: body and quantity of each
@@ -67,7 +67,7 @@ class Stated:
     values: tuple[tuple[str, Quantity], ...] = ()
 
     @classmethod
-    def of(cls, scene: Scene, varied: Iterable[str] = ()) -> Stated:
+    def of(cls, scene: Scene, varied: Iterable[str] = ()) -> StatedStart:
         """Return those of a scene; varied: paths whose values the runs state."""
         return cls(scene.statements(varied))
 
@@ -98,9 +98,9 @@ class Stated:
 
 
 class Tally:
-    """Accumulates the starts of runs over batches; stated: see `Stated`."""
+    """Accumulates the starts of runs over batches; stated: see `StatedStart`."""
 
-    def __init__(self, stated: Stated) -> None:
+    def __init__(self, stated: StatedStart) -> None:
         self.stated = stated
         self._away: list[Array] = []
 

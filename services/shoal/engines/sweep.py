@@ -12,7 +12,7 @@ import numpy as np
 
 from shoal.arguments import check, mapping, numbers
 from shoal.engines.contract import Engine, sampling_times
-from shoal.engines.starts import Elsewhere, Stated
+from shoal.engines.starts import Elsewhere, StatedStart
 from shoal.error_budget import ErrorBudget
 from shoal.errors import InputError
 from shoal.scene import Scene
@@ -69,7 +69,7 @@ class Sweep:
     check: SpotCheck | None = None
     reasons: tuple[str, ...] = ()
     changes: tuple[Mapping[str, Any], ...] = ()
-    stated: Stated = field(default_factory=Stated)
+    stated: StatedStart = field(default_factory=StatedStart)
 
     @property
     def ok(self) -> bool:
@@ -188,7 +188,7 @@ def sweep(
         trajectory.wall_s,
         reasons=trajectory.reasons,
         changes=tuple(trajectory.changes),
-        stated=Stated.of(scene, grid),
+        stated=StatedStart.of(scene, grid),
     )
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from scipy import optimize
 
 from shoal.errors import ComputationError, InputError
-from shoal.response.inputs import Inputs, Parameter
+from shoal.response.inputs import Inputs, UncertainParameter
 from shoal.response.marginals import scaled
 from shoal.response.runs import CachedModel, Model
 from shoal.scene import Scene
@@ -273,7 +273,7 @@ def accepted(scene: Scene, inputs: Inputs) -> Array:
     return np.array(found)
 
 
-def _accepts(scene: Scene, one: Parameter, factor: float) -> bool:
+def _accepts(scene: Scene, one: UncertainParameter, factor: float) -> bool:
     marginal = scaled(one.marginal, factor)
     ends = np.array([-1.0, 1.0]) if not marginal.random else marginal.germ(np.array([1e-12, 1 - 1e-12]))
     try:

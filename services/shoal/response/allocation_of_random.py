@@ -36,7 +36,7 @@ from shoal.response.limits.inverse import Nearest, nearest
 from shoal.response.limits.judge import watched
 from shoal.response.limits.judged import undecided
 from shoal.response.limits.margins import FAR, Margins, least
-from shoal.response.machine import Machine
+from shoal.response.machine import ResponseModel
 from shoal.response.respond import respond
 from shoal.response.runs import Answers
 from shoal.trajectory import Array
@@ -164,7 +164,7 @@ class Confirmed:
 
 def of_random(
     limit: Limit,
-    machine: Machine,
+    machine: ResponseModel,
     inputs: Inputs,
     stated: Judged,
     target: float,
@@ -245,7 +245,7 @@ def _germs(inputs: Inputs, germ: Array, place: Array | None) -> Array:
 
 
 def _deciding(
-    limit: Limit, machine: Machine, inputs: Inputs, beta: float, seed: int, *, on: bool = False
+    limit: Limit, machine: ResponseModel, inputs: Inputs, beta: float, seed: int, *, on: bool = False
 ) -> tuple[Deciding, int]:
     """Where the margin is least over the intervals and at that distance of the random parameters; runs.
 
@@ -282,7 +282,7 @@ def _deciding(
     return Deciding(germ, place, falls, beyond), made + 2 * len(inputs) + 1
 
 
-def _falls(model: Machine, inputs: Inputs, germs: Array, instant: int) -> Array:
+def _falls(model: ResponseModel, inputs: Inputs, germs: Array, instant: int) -> Array:
     """By how much the margin falls at germs, (1, parameters), if each tolerance doubles, to first order, (parameters,).
 
     From narrower ones, as wider ones may reach where the machine has no sense.
@@ -297,7 +297,7 @@ def _falls(model: Machine, inputs: Inputs, germs: Array, instant: int) -> Array:
 
 
 def _confirmed(
-    limit: Limit, machine: Machine, inputs: Inputs, factors: Array, beyond: float, **how: Any
+    limit: Limit, machine: ResponseModel, inputs: Inputs, factors: Array, beyond: float, **how: Any
 ) -> tuple[Confirmed, int]:
     """By the largest probability over the intervals; runs. beyond: of `Deciding`."""
     here = with_factors(inputs, factors)

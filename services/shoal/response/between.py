@@ -21,9 +21,9 @@ from shoal.response.limits.choice import probability
 from shoal.response.limits.judge import watched
 from shoal.response.limits.judged import Between
 from shoal.response.limits.margins import FAR, Margins
-from shoal.response.machine import Machine
+from shoal.response.machine import ResponseModel
 from shoal.response.methods.nested import best
-from shoal.response.respond import Answer, respond
+from shoal.response.respond import ModelResponse, respond
 from shoal.response.runs import Answers, CachedModel
 from shoal.response.study import Study
 from shoal.trajectory import Array
@@ -40,7 +40,7 @@ GAP = 0.05
 
 def between(
     limit: Limit,
-    machine: Machine,
+    machine: ResponseModel,
     inputs: Inputs,
     *,
     way: str,
@@ -74,14 +74,14 @@ def between(
 
 def searched(
     limit: Limit,
-    machine: Machine,
+    machine: ResponseModel,
     inputs: Inputs,
     *,
     way: str,
     few: int,
     seed: int,
     progress: Callable[[int], None] | None = None,
-) -> tuple[Answer, int, int]:
+) -> tuple[ModelResponse, int, int]:
     """Bounds of the reliability index over the intervals, runs made, and how many failed.
 
     few: runs at each interval value, at most. Raises InputError, ComputationError.

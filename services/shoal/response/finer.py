@@ -10,7 +10,7 @@ import numpy as np
 
 from shoal.engines.ways import on_finer_mesh
 from shoal.response.inputs import BoolArray
-from shoal.response.machine import Machine
+from shoal.response.machine import ResponseModel
 from shoal.response.runs import CachedModel
 from shoal.scene.refined import refined
 from shoal.trajectory import Array, plain
@@ -49,7 +49,7 @@ class Finer:
         return {"mesh": self.mesh, "runs": self.runs, "failed": self.failed, "share_of_bounds": plain(known.mean())}
 
 
-def repeated(machine: Machine, runs: CachedModel) -> Finer | None:
+def repeated(machine: ResponseModel, runs: CachedModel) -> Finer | None:
     """None where nothing bends. Raises InputError."""
     mesh = refined(machine.scene, 2)
     if not mesh:

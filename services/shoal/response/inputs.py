@@ -40,7 +40,7 @@ class Joint:
 
 
 @dataclass(frozen=True)
-class Parameter:
+class UncertainParameter:
     """An uncertain parameter.
 
     name: as it was given; factors: path -> what its value is multiplied by there (more than one path: a tie); joint:
@@ -57,7 +57,7 @@ class Parameter:
 class Inputs:
     """Parameters and their correlations. Raises InputError."""
 
-    parameters: tuple[Parameter, ...]
+    parameters: tuple[UncertainParameter, ...]
     correlations: Correlations | None = None
 
     def __post_init__(self) -> None:

@@ -34,7 +34,7 @@ def quantities(dimensions: int) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True)
-class Machine:
+class ResponseModel:
     """Call it with path -> values. Columns: instants, markers and quantities, in this order.
 
     Quantities are x, y [m] and angle [rad]; in space x, y and z, where an angle in the plane z = 0 may jump.
@@ -52,7 +52,7 @@ class Machine:
     fixed: str = ""
     starts: Tally | None = None
 
-    def at(self, values: Mapping[str, float]) -> Machine:
+    def at(self, values: Mapping[str, float]) -> ResponseModel:
         """The same machine with these values. Raises InputError."""
         return replace(self, scene=self.scene.with_values(values), fixed=f"{self.fixed}{dict(values)}")
 

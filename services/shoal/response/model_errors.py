@@ -16,7 +16,7 @@ from shoal.engines.sources import WRONG
 from shoal.engines.verification import Verification, run_verified
 from shoal.error_budget import ErrorBudget, worst
 from shoal.response.boxes import Boxes, Ends
-from shoal.response.machine import Machine, stable
+from shoal.response.machine import ResponseModel, stable
 from shoal.response.result import Bounds
 from shoal.response.runs import CachedModel
 from shoal.response.statistics import Statistics
@@ -62,12 +62,12 @@ class ModelErrors:
         return replace(found, lower_outer=found.lower_outer - off, upper_outer=found.upper_outer + off)
 
 
-def unestimated(machine: Machine) -> ModelErrors:
+def unestimated(machine: ResponseModel) -> ModelErrors:
     """None are known."""
     return ModelErrors(ErrorBudget(), np.zeros(int(np.prod(machine.columns))))
 
 
-def model_errors(machine: Machine, runs: CachedModel, chosen: Sequence[int]) -> ModelErrors:
+def model_errors(machine: ResponseModel, runs: CachedModel, chosen: Sequence[int]) -> ModelErrors:
     """Return the largest errors of some runs of a study. chosen: their numbers. Raises InputError."""
     found = unestimated(machine)
     for run in chosen:
@@ -112,7 +112,7 @@ class _Nothing:
         return f"; {self.length:.2g} m, {100 * NEGLIGIBLE:g} % of the width of {self.name}, would be nothing"
 
 
-def _nothing(machine: Machine, values: Array) -> _Nothing:
+def _nothing(machine: ResponseModel, values: Array) -> _Nothing:
     """values: of all runs, (runs, columns)."""
     widths = np.ptp(values, axis=0).reshape(machine.columns).max(axis=0)
     coordinates = [k for k, name in enumerate(machine.quantities) if name in "xyz"]

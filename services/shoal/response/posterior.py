@@ -18,7 +18,7 @@ from scipy import special, stats
 
 from shoal.errors import InputError
 from shoal.estimated import checked_joint, read_estimate
-from shoal.response.inputs import Joint, Parameter
+from shoal.response.inputs import Joint, UncertainParameter
 from shoal.response.marginals import Frozen, Marginal, Normal
 from shoal.scene import Scene
 from shoal.trajectory import Array
@@ -39,7 +39,7 @@ def is_source(given: str) -> bool:
     return given.endswith(ENDINGS) and "=" not in given and "~" not in given
 
 
-def from_posterior(file: str, scene: Scene) -> list[Parameter]:
+def from_posterior(file: str, scene: Scene) -> list[UncertainParameter]:
     """The parameters of the machine, named by their paths. Raises InputError."""
     path = Path(file)
     told, left, draws = _draws(path) if path.suffix == ".nc" else (*_estimate(path), None)
@@ -59,7 +59,7 @@ def from_posterior(file: str, scene: Scene) -> list[Parameter]:
     }
     joint = Joint(path.name, pairs, told["ties"], names, told["constants"], left)
     found = [
-        Parameter(names[name], marginal, {one["path"]: 1.0} if one["path"] else {}, joint)
+        UncertainParameter(names[name], marginal, {one["path"]: 1.0} if one["path"] else {}, joint)
         for (name, one), marginal in zip(known.items(), marginals, strict=True)
     ]
     _accepted(found, scene, file)
@@ -150,7 +150,7 @@ class _Draws:
         return float(self._sorted.std())
 
 
-def _accepted(found: list[Parameter], scene: Scene, file: str) -> None:
+def _accepted(found: list[UncertainParameter], scene: Scene, file: str) -> None:
     """Raises InputError where the scene has no such field, or refuses a value that is likely."""
     ends = [one.marginal.value(one.marginal.germ(special.ndtr(np.array([-FAR, FAR])))) for one in found]
     for one, (low, high) in zip(found, ends, strict=True):

@@ -13,7 +13,7 @@ from scipy import stats
 
 from shoal.errors import InputError
 from shoal.regular import require_regular
-from shoal.response.inputs import Parameter
+from shoal.response.inputs import UncertainParameter
 from shoal.response.marginals import Empirical, Frozen, Interval, Marginal, Normal, Uniform
 from shoal.response.posterior import from_posterior, is_source
 from shoal.response.salib import from_salib, is_problem
@@ -67,16 +67,18 @@ DISTRIBUTIONS: dict[str, tuple[Callable[..., Marginal], str]] = {
 """Name -> what makes it from its numbers, and what these are. `empirical(FILE.csv)` is another."""
 
 
-def parameters(vary: Mapping[str, Any] | Sequence[str | Parameter], scene: Scene) -> tuple[Parameter, ...]:
+def parameters(
+    vary: Mapping[str, Any] | Sequence[str | UncertainParameter], scene: Scene
+) -> tuple[UncertainParameter, ...]:
     """The uncertain parameters of a scene, each of which it accepts at its ends. Raises InputError."""
     if is_problem(vary):
         vary = from_salib(cast(Mapping[str, Any], vary))
     if isinstance(vary, Mapping):
         return tuple(_parameter(name, known, scene) for name, known in vary.items())
     given = [vary] if isinstance(vary, str) else vary
-    found: list[Parameter] = []
+    found: list[UncertainParameter] = []
     for one in given:
-        if isinstance(one, Parameter):
+        if isinstance(one, UncertainParameter):
             found.append(one)
         elif is_source(one):
             found += from_posterior(one, scene)
@@ -111,7 +113,7 @@ def _ends(text: str, known: str) -> tuple[str, str]:
     return low.strip(), high.strip()
 
 
-def _parameter(name: str, known: Any, scene: Scene) -> Parameter:
+def _parameter(name: str, known: Any, scene: Scene) -> UncertainParameter:
     paths = [path.strip() for path in name.split(",")]
     nominal = {path: _nominal(path, scene) for path in paths}
     marginal = _marginal(name, known, nominal[paths[0]])
@@ -127,7 +129,7 @@ def _parameter(name: str, known: Any, scene: Scene) -> Parameter:
             scene.with_values({path: float(end) * factor for path, factor in factors.items()})
         except InputError as error:
             raise InputError(_reaching(name, marginal, low, high, error)) from None
-    return Parameter(name, marginal, factors)
+    return UncertainParameter(name, marginal, factors)
 
 
 def _reaching(name: str, marginal: Marginal, low: float, high: float, error: InputError) -> str:

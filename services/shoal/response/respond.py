@@ -31,7 +31,7 @@ MOST = 20_000
 
 
 @dataclass(frozen=True)
-class Answer:
+class ModelResponse:
     """What is found of any model: bounds or statistics of its columns, and how."""
 
     found: Found
@@ -72,7 +72,7 @@ def respond(
     most: int = MOST,
     progress: Callable[[int], None] | None = None,
     over_time: Callable[[Array], Model] | None = None,
-) -> Answer:
+) -> ModelResponse:
     """Bounds or statistics of any function of named values; see `Study`.
 
     model: path -> values, (runs,), to answers, (runs, columns). Raises InputError, ComputationError.
@@ -107,7 +107,7 @@ def respond(
     if boxes is not None and math.isfinite(boxes.horizon):
         with suppress(TimeIsUpError):
             boxes = sampled(study, boxes)
-    return Answer(found, runs, bounds, statistics, boxes)
+    return ModelResponse(found, runs, bounds, statistics, boxes)
 
 
 def _broken_off(runs: CachedModel) -> Found:

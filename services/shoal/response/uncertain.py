@@ -15,7 +15,7 @@ import numpy as np
 from shoal.compile import clock
 from shoal.engines import get_engine
 from shoal.engines.contract import sampling_times
-from shoal.engines.starts import Stated, Tally
+from shoal.engines.starts import StatedStart, Tally
 from shoal.errors import ComputationError, InputError
 from shoal.mechanics import reach
 from shoal.memory import Memory
@@ -41,10 +41,10 @@ from shoal.response.limits.crosschecked import allowing, crosschecked
 from shoal.response.limits.judge import Reach, require, watched
 from shoal.response.limits.limit import Limit
 from shoal.response.limits.quantities import of_section
-from shoal.response.machine import Machine
+from shoal.response.machine import ResponseModel
 from shoal.response.model_errors import model_errors, unestimated
 from shoal.response.read import parameters
-from shoal.response.respond import Answer, respond
+from shoal.response.respond import ModelResponse, respond
 from shoal.response.result import Bounds, Response
 from shoal.response.runs import Model
 from shoal.scene import Scene
@@ -70,7 +70,7 @@ def uncertain(asked: Uncertain, scene: Scene) -> Response:
     end = None if asked.time_limit is None else clock.now() + asked.time_limit
     wanted = scene
     inputs = Inputs(parameters(asked.vary, wanted), asked.correlate or None)
-    starts = Tally(Stated.of(wanted, [path for one in inputs.parameters for path in one.factors]))
+    starts = Tally(StatedStart.of(wanted, [path for one in inputs.parameters for path in one.factors]))
     get_way(asked.limit_method)
     # The start is stated, not a response: of the scene's own instants those after it count.
     when = sampling_times(wanted, asked.at) if asked.at is not None else sampling_times(wanted, None)[1:]
@@ -79,7 +79,7 @@ def uncertain(asked: Uncertain, scene: Scene) -> Response:
     if asked.tolerance is not None:
         wanted = _modelled(wanted, inputs, asked.tolerance, when, asked.engine, conditions)
     keep = _keep(wanted, when, asked.engine, asked.checkpoint, end)
-    machine = Machine(wanted, when, get_engine(asked.engine), keep=keep, starts=starts)
+    machine = ResponseModel(wanted, when, get_engine(asked.engine), keep=keep, starts=starts)
     for one in conditions:
         require(machine, one, inputs)
     count_t, count_m, count_q = machine.columns
@@ -192,7 +192,7 @@ def _named(missed: Mapping[str, float]) -> str:
     return f": {told}{more}" if told else ""
 
 
-def _beyond(scene: Scene, inputs: Inputs, bounds: Bounds, machine: Machine) -> Bounds:
+def _beyond(scene: Scene, inputs: Inputs, bounds: Bounds, machine: ResponseModel) -> Bounds:
     """Outer bounds that are the kinematic reach beyond the horizon, where there is one; angles have none."""
     ends = inputs.values(np.array([-np.ones(len(inputs)), np.ones(len(inputs))]))
     length = max(float(np.max(reach.size(scene.with_lanes(ends)))), 0.0) if reach.tethered(scene) else math.inf
@@ -207,7 +207,7 @@ def _beyond(scene: Scene, inputs: Inputs, bounds: Bounds, machine: Machine) -> B
     return replace(bounds, lower_outer=lower, upper_outer=upper)
 
 
-def _deciding(answer: Answer, seed: int) -> list[int]:
+def _deciding(answer: ModelResponse, seed: int) -> list[int]:
     """The runs that attain most bounds, or some that were drawn."""
     runs = answer.runs
     if answer.bounds is None:
@@ -246,7 +246,7 @@ def _reach(inputs: Inputs, when: Array, gap: float | None, seed: int, most: int)
 
 
 def _allocated(
-    stated: Judged, machine: Machine, costs: Mapping[str, float], target: float, most: int, how: Mapping[str, Any]
+    stated: Judged, machine: ResponseModel, costs: Mapping[str, float], target: float, most: int, how: Mapping[str, Any]
 ) -> Allocation:
     """The cheapest tolerances that keep a limit. stated: what is known of it with those that are stated."""
     wanted, inputs, seed = stated.limit, stated.inputs, how["seed"]
@@ -264,7 +264,7 @@ def _allocated(
     return of_intervals(wanted.required, told, inputs, least, prices, widest)
 
 
-def _status(answer: Answer, gap: float | None, rejected: str, judged: Sequence[Judged]) -> tuple[str, str]:
+def _status(answer: ModelResponse, gap: float | None, rejected: str, judged: Sequence[Judged]) -> tuple[str, str]:
     """ok, or what speaks against believing the answer, and why."""
     runs, bounds = answer.runs, answer.bounded
     if runs.failed:

@@ -10,7 +10,7 @@ import numpy as np
 
 from shoal.engines import get_engine
 from shoal.errors import InputError
-from shoal.response.inputs import Parameter
+from shoal.response.inputs import UncertainParameter
 from shoal.response.limits import Shown
 from shoal.response.limits.judge import show
 from shoal.response.limits.limit import Limit
@@ -53,7 +53,7 @@ def worst(found: Response, of: str = "") -> list[Worst]:
     return [_case(found, text, shown) for text, shown in cases.items()]
 
 
-def require_case(of: str, limits: Sequence[Limit], scene: Scene, parameters: Sequence[Parameter]) -> None:
+def require_case(of: str, limits: Sequence[Limit], scene: Scene, parameters: Sequence[UncertainParameter]) -> None:
     """Raises InputError for what can be no case of a study of a scene with limits, before it is made."""
     texts = [one.text for one in limits]
     if not of or of in texts:

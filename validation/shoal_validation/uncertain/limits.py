@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import integrate, stats
 from scipy.stats import qmc
-from shoal.response.inputs import Inputs, Parameter
+from shoal.response.inputs import Inputs, UncertainParameter
 from shoal.response.limits.choice import probability
 from shoal.response.limits.margins import Margins
 from shoal.response.marginals import Normal
@@ -50,7 +50,9 @@ def margins(function: Function, count: int) -> Margins:
         found = found if found.ndim == 2 else found[:, None]
         return Answers(found, np.ones(len(found), dtype=bool))
 
-    return Margins(model, Inputs(tuple(Parameter(name, Normal(0.0, 1.0), {name: 1.0}) for name in names)), MOST)
+    return Margins(
+        model, Inputs(tuple(UncertainParameter(name, Normal(0.0, 1.0), {name: 1.0}) for name in names)), MOST
+    )
 
 
 def plane(beta: float, count: int) -> tuple[Function, float]:

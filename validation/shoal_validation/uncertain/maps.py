@@ -16,7 +16,7 @@ from itertools import product
 import numpy as np
 from shoal.errors import InputError
 from shoal.response import respond
-from shoal.response.inputs import Inputs, Parameter
+from shoal.response.inputs import Inputs, UncertainParameter
 from shoal.response.marginals import Interval
 from shoal.response.runs import Answers, Model
 from shoal.trajectory import Array
@@ -52,7 +52,9 @@ class Question:
     def inputs(self) -> Inputs:
         """Stiffnesses."""
         ends = 1 - self.width / 2, 1 + self.width / 2
-        return Inputs(tuple(Parameter(f"k{n}", Interval(*ends), {f"k{n}": 1.0}) for n in range(self.parameters)))
+        return Inputs(
+            tuple(UncertainParameter(f"k{n}", Interval(*ends), {f"k{n}": 1.0}) for n in range(self.parameters))
+        )
 
     def _stretched(self, times: Array) -> Array:
         return times if self.rate == 0 else np.asarray(np.expm1(self.rate * times) / self.rate)

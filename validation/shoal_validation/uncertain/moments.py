@@ -9,7 +9,7 @@ from functools import reduce
 import numpy as np
 from scipy import stats
 from shoal.response import respond
-from shoal.response.inputs import Inputs, Parameter
+from shoal.response.inputs import Inputs, UncertainParameter
 from shoal.response.marginals import Frozen, Marginal, Normal, Uniform
 from shoal.response.runs import Answers
 from shoal.trajectory import Array
@@ -88,7 +88,7 @@ def _moments(of: Function, marginal: Marginal) -> tuple[float, float]:
 
 
 def _inputs(marginals: list[Marginal]) -> Inputs:
-    return Inputs(tuple(Parameter(f"x{k}", one, {f"x{k}": 1.0}) for k, one in enumerate(marginals)))
+    return Inputs(tuple(UncertainParameter(f"x{k}", one, {f"x{k}": 1.0}) for k, one in enumerate(marginals)))
 
 
 def _shape(random: np.random.Generator, size: float) -> tuple[str, Function]:

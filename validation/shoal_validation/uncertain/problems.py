@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import ellipj, ellipk
-from shoal.response.inputs import Inputs, Parameter
+from shoal.response.inputs import Inputs, UncertainParameter
 from shoal.response.marginals import Interval
 from shoal.response.runs import Answers, Model
 from shoal.trajectory import Array
@@ -37,7 +37,9 @@ class Problem:
     @property
     def inputs(self) -> Inputs:
         """Intervals [-1, 1]."""
-        return Inputs(tuple(Parameter(f"u{k}", Interval(-1.0, 1.0), {f"u{k}": 1.0}) for k in range(self.parameters)))
+        return Inputs(
+            tuple(UncertainParameter(f"u{k}", Interval(-1.0, 1.0), {f"u{k}": 1.0}) for k in range(self.parameters))
+        )
 
     def at(self, instants: Array) -> Model:
         """As a model."""

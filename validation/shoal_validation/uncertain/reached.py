@@ -13,10 +13,10 @@ from shoal.engines import get_engine
 from shoal.engines.ways import on_finer_mesh
 from shoal.notebook import uncertain
 from shoal.response import Response, respond
-from shoal.response.inputs import Inputs, Parameter
-from shoal.response.machine import Machine
+from shoal.response.inputs import Inputs, UncertainParameter
+from shoal.response.machine import ResponseModel
 from shoal.response.marginals import Normal, Uniform
-from shoal.response.respond import Answer
+from shoal.response.respond import ModelResponse
 from shoal.response.runs import Answers
 from shoal.scene import load_scene
 from shoal.trajectory import Array
@@ -146,7 +146,7 @@ def _moved(found: Response) -> float:
     places = np.unique(np.concatenate([bounds.at_lower, bounds.at_upper]).round(12), axis=0)
     lanes = {name: places[:, k] for k, name in enumerate(names)}
     scene = next(on_finer_mesh(found.stated, 4))
-    told = Machine(scene, found.times, get_engine("gauss"))(lanes).values
+    told = ResponseModel(scene, found.times, get_engine("gauss"))(lanes).values
     moved = [
         np.abs(found.column("B", axis, extreme) - found.column("B", axis, bound))
         for axis in found.axes
@@ -187,7 +187,7 @@ def _motion(name: str, problem: Problem, wanted: float, runs: int, unit: str) ->
     )
 
 
-def _asked(problem: Problem) -> Answer:
+def _asked(problem: Problem) -> ModelResponse:
     times, count = np.array(problem.times), len(problem.times)
     return respond(
         problem.at(times),
@@ -291,17 +291,17 @@ def indices() -> Iterator[Reached]:
     yield _indices("the g-function", _told(kinked, 4, Uniform(0.0, 1.0)), exact)
 
 
-def _told(function: Callable[[Mapping[str, Array]], Array], count: int, of: Normal | Uniform) -> Answer:
+def _told(function: Callable[[Mapping[str, Array]], Array], count: int, of: Normal | Uniform) -> ModelResponse:
     """By `auto`."""
 
     def model(values: Mapping[str, Array]) -> Answers:
         told = function(values)
         return Answers(told[:, None], np.ones(len(told), dtype=bool))
 
-    return respond(model, Inputs(tuple(Parameter(f"x{k}", of, {f"x{k}": 1.0}) for k in range(count))), 1)
+    return respond(model, Inputs(tuple(UncertainParameter(f"x{k}", of, {f"x{k}": 1.0}) for k in range(count))), 1)
 
 
-def _indices(name: str, answer: Answer, exact: Array) -> Reached:
+def _indices(name: str, answer: ModelResponse, exact: Array) -> Reached:
     found = answer.statistics
     assert found is not None
     off = float(np.abs(np.stack([found.first[:, 0], found.total[:, 0]]) - exact).max())

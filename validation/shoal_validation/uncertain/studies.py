@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from shoal.response import respond
-from shoal.response.inputs import Inputs, Parameter
+from shoal.response.inputs import Inputs, UncertainParameter
 from shoal.response.marginals import Interval
-from shoal.response.respond import Answer
+from shoal.response.respond import ModelResponse
 from shoal.response.runs import Answers, Model
 from shoal.trajectory import Array
 
@@ -59,7 +59,7 @@ class Drawn:
         fields = self.kind.fields
         return Inputs(
             tuple(
-                Parameter(f"f{k}", Interval(fields[k] * (1 - share), fields[k] * (1 + share)), {f"f{k}": 1.0})
+                UncertainParameter(f"f{k}", Interval(fields[k] * (1 - share), fields[k] * (1 + share)), {f"f{k}": 1.0})
                 for k, share in zip(self.varied, self.shares, strict=True)
             )
         )
@@ -130,7 +130,7 @@ def judged(asked: Drawn, runs: int = RUNS) -> Judged:
     return against(asked, answered(asked), runs)
 
 
-def answered(asked: Drawn) -> Answer:
+def answered(asked: Drawn) -> ModelResponse:
     """By `auto`."""
     times, signals = asked.times, asked.signals
     return respond(
@@ -145,7 +145,7 @@ def answered(asked: Drawn) -> Answer:
     )
 
 
-def against(asked: Drawn, answer: Answer, runs: int) -> Judged:
+def against(asked: Drawn, answer: ModelResponse, runs: int) -> Judged:
     """So many random runs against an answer."""
     signals = asked.signals
     bounds, times = answer.bounds, asked.times

@@ -15,12 +15,12 @@ from shoal.response.limits.counted import contradiction, ends
 from shoal.response.limits.estimate import ExceedanceEstimate
 from shoal.response.limits.judged import Judged
 from shoal.response.limits.limit import Limit
-from shoal.response.machine import Machine
+from shoal.response.machine import ResponseModel
 from shoal.response.statistics import Statistics
 from shoal.trajectory import Array
 
 
-def crosschecked(judged: Judged, machine: Machine, values: Array, *, shared: bool) -> Judged:
+def crosschecked(judged: Judged, machine: ResponseModel, values: Array, *, shared: bool) -> Judged:
     """Test a probability against the runs that estimated mean and standard deviation of the limit's quantity.
 
     values: (runs, columns); shared: whether runs share parameters with others, as those that tell indices do
@@ -34,7 +34,9 @@ def crosschecked(judged: Judged, machine: Machine, values: Array, *, shared: boo
     return replace(judged, passing=replace(judged.passing, doubt=doubt))
 
 
-def allowing(told: Statistics, machine: Machine, limit: Limit, estimate: ExceedanceEstimate) -> tuple[Statistics, str]:
+def allowing(
+    told: Statistics, machine: ResponseModel, limit: Limit, estimate: ExceedanceEstimate
+) -> tuple[Statistics, str]:
     """Statistics whose errors allow for the probability of a limit; in words what they have missed, if anything."""
     columns = _columns(machine, limit)
     if columns is None:
@@ -71,7 +73,7 @@ def shifts(limit: Limit, mean: Array, error: Array, estimate: ExceedanceEstimate
     return p * distance, distance * np.sqrt(p / (1 - p))
 
 
-def _columns(machine: Machine, limit: Limit) -> IntArray | None:
+def _columns(machine: ResponseModel, limit: Limit) -> IntArray | None:
     """Return the columns of a study that hold the quantity of a limit, (instants,); None where none do."""
     if limit.quantity not in machine.quantities or limit.place not in machine.scene.markers:
         return None

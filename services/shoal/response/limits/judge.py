@@ -17,7 +17,7 @@ from shoal.response.limits.judged import Judged, Shown
 from shoal.response.limits.limit import Limit
 from shoal.response.limits.margin_errors import margin_errors
 from shoal.response.limits.margins import Margins
-from shoal.response.machine import Machine, stable
+from shoal.response.machine import ResponseModel, stable
 from shoal.response.runs import Model
 from shoal.scene import Scene
 from shoal.trajectory import Array, Trajectory
@@ -45,7 +45,7 @@ class MarginWatch:
         return self.limit.margins(motion, scene, values)[:, -self.instants :]
 
 
-def watched(machine: Machine, limit: Limit) -> Machine:
+def watched(machine: ResponseModel, limit: Limit) -> ResponseModel:
     """Return the machine with the margins of a limit as its answers."""
     told = MarginWatch(limit, len(machine.times)).margins
     return replace(
@@ -57,14 +57,14 @@ def watched(machine: Machine, limit: Limit) -> Machine:
     )
 
 
-def require(machine: Machine, limit: Limit, inputs: Inputs) -> None:
+def require(machine: ResponseModel, limit: Limit, inputs: Inputs) -> None:
     """Check by a run in the middle that the machine gives the quantity of a limit. Raises InputError."""
     if limit.is_dynamic:
         middle = inputs.values(inputs.germs(np.full((1, len(inputs)), 0.5)))
         watched(replace(machine, keep=None), limit)(middle)
 
 
-def _show(limit: Limit, machine: Machine, inputs: Inputs, germ: Array, verify: bool) -> Shown:
+def _show(limit: Limit, machine: ResponseModel, inputs: Inputs, germ: Array, verify: bool) -> Shown:
     """Run the machine once more at a germ; a run that is refused costs the other answers nothing and is a doubt."""
     named = inputs.named(germ[None])[0]
     try:
@@ -74,7 +74,7 @@ def _show(limit: Limit, machine: Machine, inputs: Inputs, germ: Array, verify: b
         return Shown(values, inputs.at(named), math.nan, math.nan, "refused", str(error))
 
 
-def _run_shown(limit: Limit, machine: Machine, inputs: Inputs, named: Array, verify: bool) -> Shown:
+def _run_shown(limit: Limit, machine: ResponseModel, inputs: Inputs, named: Array, verify: bool) -> Shown:
     """Raises InputError, ComputationError."""
     if verify:
         return show(limit, machine.scene, machine.times, machine.engine, inputs, named)
@@ -86,7 +86,7 @@ def _run_shown(limit: Limit, machine: Machine, inputs: Inputs, named: Array, ver
 
 def judge(
     limit: Limit,
-    machine: Machine,
+    machine: ResponseModel,
     inputs: Inputs,
     reach: Reach,
     *,
@@ -139,7 +139,7 @@ def _decided(attained: Array, outer: Array) -> bool | None:
     return False if attained.min() < 0 else True if outer.min() >= 0 else None
 
 
-def _between(limit: Limit, machine: Machine, shown: Shown) -> float | None:
+def _between(limit: Limit, machine: ResponseModel, shown: Shown) -> float | None:
     """When [s] a run passes a limit first of all instants between those of a machine; None if at none."""
     begin, end = float(machine.times[0]), float(machine.times[-1])
     scene = limit.scene(machine.scene.with_values(shown.values))

@@ -13,7 +13,7 @@ import numpy as np
 
 from shoal.response.expansion import Expansion, fit
 from shoal.response.indices import designs, jansen
-from shoal.response.inputs import BoolArray, Inputs, IntArray, Parameter
+from shoal.response.inputs import BoolArray, Inputs, IntArray, UncertainParameter
 from shoal.response.links.combined import combined
 from shoal.response.links.link import CLEARLY, Fitted, of, some
 from shoal.response.marginals import Marginal, Normal
@@ -100,7 +100,7 @@ def _ridge(study: Study, fitted: Fitted, way: Array, decay: Decay | None = None)
     """Along this direction."""
     inputs, values = study.inputs, study.runs.values
     marginal: Marginal = Normal(0.0, 1.0) if inputs.unbounded.all() else combined(inputs, way)
-    one = Inputs((Parameter("along", marginal, {}),))
+    one = Inputs((UncertainParameter("along", marginal, {}),))
     places = (_standardised(inputs, study.runs.germs) @ way)[:, None]
     along = fitted(of(study, one, places, values))
     if decay is None and along.left_out[0] > FINE * values.std():
