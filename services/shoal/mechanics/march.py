@@ -58,9 +58,6 @@ CHECK_EVERY = 4
 """An adaptive run is looked at every so many steps, each of which is worth a dozen looks."""
 PAUSE = 0.1
 """After about so long [s] the compiled loop returns: unnoticed by who waits, and beside it the return takes no time."""
-WORK = 20_000
-"""Unknowns, times lanes, times steps before the first return: some milliseconds of the cheapest step, and no more than
-about a second of an implicit step with a new factor for each iteration."""
 GROWTH = 4.0
 """Largest ratio of the numbers of steps until one return and until the next."""
 CREEPING = 10.0
@@ -75,8 +72,9 @@ class March:
     The compiled loop gets nothing but an address, at which the frame lies with pointers for its arrays.
     """
 
-    def __init__(self, frame: Frame) -> None:
-        self.frame = frame
+    def __init__(self, frame: Frame, seconds: float = PAUSE) -> None:
+        """seconds: that a step takes, by order of magnitude."""
+        self.frame, self._first = frame, PAUSE / seconds
         self._storage = structures.storage()
         structures.write(frame.arrays.storage, frame.arrays)
         structures.write(frame.room.storage, frame.room)
@@ -92,8 +90,8 @@ class March:
         stop: raises KeyboardInterrupt once this is set, as a thread that waits for others does when it hears a signal.
         The end of the main thread, which hears signals, is heard as well.
         """
-        frame, progress = self.frame, self.frame.own.progress
-        steps, before, slow = WORK / (len(frame.tile) * frame.arrays.unknowns + 1.0), (0.0, 0.0), False
+        progress = self.frame.own.progress
+        steps, before, slow = self._first, (0.0, 0.0), False
         progress[:] = 0.0
         while True:
             progress[ROOM], begin = max(1.0, steps), time.perf_counter()

@@ -96,7 +96,9 @@ class Workspace:
         self._sought = None if seek is None else Sought(seek(arrays, room), model.unknowns)
         if self._sought is not None:
             frame = frame._replace(arrays=self._sought.joined(arrays, room))
-        self.march = March(frame)
+        known = facts(choice.name)
+        numbers = max(1, model.unknowns) * len(tile)
+        self.march = March(frame, known.seconds_per_unknown[model.constraints.size > 0] * known.stages * numbers)
         self._start = self._block.copy()
 
     @property
