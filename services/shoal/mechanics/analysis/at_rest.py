@@ -46,7 +46,7 @@ def at_start(scene: Scene, *, horizon: float = 0.0) -> Evaluator:
 
 
 def _equilibrium(scene: Scene) -> Equilibrium:
-    found = statics(scene)
+    found = statics(scene, reactions=False)
     if not found.ok:
         raise InputError(f"initial.from: statics finds no stable place of rest: {found.message}")
     return found

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -40,8 +39,8 @@ class Equilibrium:
     relative to all forces; gap: worst violation of a joint; correction: the last one, relative to the machine's size.
     eigenvalues: of the reduced stiffness in the metric of the mass [rad^2/s^2], lowest first; all positive means
     stable, but where forces follow the motion; levels: below these each is zero to working accuracy. steps: load steps.
-    react: returns the reactions in the joints, None where the forces do not balance. turns: angles [rad] that force
-    elements have counted, by joint or load.
+    reactions: in the joints, None where the forces do not balance or where they were not asked for.
+    turns: angles [rad] that force elements have counted, by joint or load.
     mesh_error: how far the markers are from the limit of ever finer meshes [m], theory_error: from where rods with
     shear rest, each None where it is not known; not_estimated: sources whose error is of interest and not known;
     estimated: whether errors were looked for.
@@ -66,22 +65,12 @@ class Equilibrium:
     levels: Array
     iterations: int
     steps: int
-    react: Callable[[], Reactions] | None = field(repr=False)
+    reactions: Reactions | None = field(repr=False)
     turns: Mapping[str, Sequence[float]] = field(repr=False)
     mesh_error: float | None = None
     theory_error: float | None = None
     not_estimated: tuple[str, ...] = ()
     estimated: bool = False
-
-    @cached_property
-    def reactions(self) -> Reactions | None:
-        """The reactions in the joints, computed when they are asked for; None where the forces do not balance."""
-        return self.react() if self.react is not None else None
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Return the state to pickle: with the reactions, as another process cannot compute them."""
-        found = self.reactions
-        return vars(self) | {"react": None, "reactions": found}
 
     @property
     def errors(self) -> ErrorBudget:

@@ -75,7 +75,7 @@ def of_equilibrium(found: Equilibrium, scene: Scene) -> Equilibrium:
         return found
     if not any(scene.flexible_rods):
         return replace(found, estimated=True)
-    runs = second_runs(scene, lambda _, other: statics(other, found.time))
+    runs = second_runs(scene, lambda _, other: statics(other, found.time, reactions=False))
     gaps = {source: apart(found, other) if other is not None and other.ok else None for source, other in runs.items()}
     gap = gaps.get("mesh")
     return replace(

@@ -299,7 +299,7 @@ def modes_at_rest(
 ) -> Modes:
     """The lowest modes of a machine at rest, of whose start the rates are left out."""
     if about == "equilibrium":
-        equilibrium = statics(scene, time, leave_unstable=leave_unstable)
+        equilibrium = statics(scene, time, leave_unstable=leave_unstable, reactions=False)
         if not equilibrium.balanced:
             raise ComputationError(f"{scene.name}: no equilibrium to vibrate about: {equilibrium.message}")
         return modes_about(equilibrium, count=count)

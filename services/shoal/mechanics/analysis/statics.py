@@ -8,7 +8,7 @@ Dry friction is left out, and drives stand still where they are at the stated ti
 
 from __future__ import annotations
 
-from functools import partial
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -58,21 +58,24 @@ GAPE = 1e-9
 """Joints that gape by more than this [m, relative to the machine's size] are not closed."""
 
 
-def statics(scene: Scene, time: float = 0.0, *, leave_unstable: bool = True) -> Equilibrium:
+def statics(scene: Scene, time: float = 0.0, *, leave_unstable: bool = True, reactions: bool = True) -> Equilibrium:
     """Return the equilibrium that a machine reaches from the start of its scene, with drives as they are at `time` [s].
 
     leave_unstable: go on from an unstable equilibrium (a column beyond its buckling load) to a stable one, where the
     loads have a potential. Without a potential it is stable where no small motion grows, with the damping of the
-    machine. The message names neglected effects. Raises InputError if the scene cannot be modelled.
+    machine. The message names neglected effects. reactions: compute those in the joints as well.
+
+    Raises InputError if the scene cannot be modelled.
     """
     check(time=time)
-    return _Search(scene, as_stated(scene, horizon=time), time).run(leave_unstable)
+    return _Search(scene, as_stated(scene, horizon=time), time, reactions).run(leave_unstable)
 
 
 class _Search:
     """One search for an equilibrium."""
 
-    def __init__(self, scene: Scene, evaluator: Evaluator, time: float) -> None:
+    def __init__(self, scene: Scene, evaluator: Evaluator, time: float, reactions: bool) -> None:
+        self.reactions = reactions
         self.stated, self.placement = scene, Machine.of(scene).placement
         scene = self.placement.scene
         self.scene, self.evaluator, self.time = scene, evaluator, time
@@ -212,7 +215,7 @@ class _Search:
         balanced = status is not EquilibriumStatus.FAILED and found is not None
         rest = np.zeros_like(q)
         eigenvalues, levels, _ = self._eigen(q)
-        react = partial(reactions_of, self.evaluator, q, rest, rest, self.time) if balanced else None
+        react = cache(lambda: reactions_of(self.evaluator, q, rest, rest, self.time)) if balanced else None
         notes = message, left_out.friction(self.scene, react), left_out.driven(self.evaluator, q, self.time)
         return Equilibrium(
             scene=self.stated,
@@ -234,7 +237,7 @@ class _Search:
             levels=levels,
             iterations=self.iterations,
             steps=self.steps,
-            react=react,
+            reactions=react() if react is not None and self.reactions else None,
             turns=named_turns(self.evaluator.model, self.evaluator.turns),
         )
 
