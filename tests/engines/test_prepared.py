@@ -137,7 +137,7 @@ def test_bad_questions_are_refused_each_time() -> None:
     for _ in range(2):
         with pytest.raises(InputError, match="stability limit"):
             prepared(times=[0.1])
-        with pytest.raises(InputError, match=r"times: must increase, found 0\.1 after 0\.2 s"):
+        with pytest.raises(InputError, match=r"at: must increase, found 0\.1 after 0\.2 s"):
             prepared(times=[0.2, 0.1])
         with pytest.raises(InputError, match="no such field"):
             prepared({"bodies.OA.colour": 1.0})

@@ -70,12 +70,12 @@ def sampling_times(scene: Scene, times: Sequence[float] | Array | None) -> Array
     """
     if times is None:
         return np.linspace(0.0, scene.solver.duration, scene.solver.samples + 1)
-    wanted = numbers("times", times, "times in s")
+    wanted = numbers("at", times, "times in s")
     if wanted[0] < 0:
-        raise InputError(f"times: must start at or after 0 s, found {wanted[0]:g}")
+        raise InputError(f"at: must start at or after 0 s, found {wanted[0]:g}")
     if np.any(falls := np.diff(wanted) <= 0):
         first = int(np.argmax(falls))
-        raise InputError(f"times: must increase, found {wanted[first + 1]:g} after {wanted[first]:g} s")
+        raise InputError(f"at: must increase, found {wanted[first + 1]:g} after {wanted[first]:g} s")
     return wanted
 
 

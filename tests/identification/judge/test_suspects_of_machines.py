@@ -119,13 +119,15 @@ def test_a_marker_that_was_lost_for_a_while_is_told_with_its_time() -> None:
     values = run.values.copy()
     values[np.ix_(held, marker)] = values[held][0, marker]
     lost = model.aside(measurement=model.measurement.changed(lambda run: replace(run, values=values)))
-    said, do = odd_stretch(lost, descend(lost, np.array([-0.9]), lambda *_: None).point)
-    begin, end = (float(time) for time in re.findall(r"[\d.]+(?= s)", said))
-    assert said.startswith("without M from ")
+    found = odd_stretch(lost, descend(lost, np.array([-0.9]), lambda *_: None).point)
+    assert found is not None
+    assert found.code == "odd-stretch"
+    begin, end = (float(time) for time in re.findall(r"[\d.]+(?= s)", found.text))
+    assert found.text.startswith("without M from ")
     assert begin == pytest.approx(1.0, abs=0.11)
     assert end == pytest.approx(1.3, abs=1e-3)
-    assert do.startswith("check M from ")
-    assert odd_stretch(model_of({"gravity": [0.0, -9.0]}), np.array([-0.9])) == ("", "")
+    assert found.steps[0].startswith("check M from ")
+    assert odd_stretch(model_of({"gravity": [0.0, -9.0]}), np.array([-0.9])) is None
 
 
 @pytest.mark.slow

@@ -132,9 +132,10 @@ def test_a_whole_recording_with_exchanged_markers_contradicts_the_poses_of_the_m
     assert exchanged(ForwardModel(problem, scene, get_engine("gauss"), right)) is None
     larger = Measurement.single(recording.times, recording.channels, 1.3 * recording.values, "another size")
     assert exchanged(ForwardModel(problem, scene, get_engine("gauss"), larger)) is None
-    words = exchanged(ForwardModel(problem, scene, get_engine("gauss"), wrong))
-    assert words is not None
-    assert "A and B" in words
+    found = exchanged(ForwardModel(problem, scene, get_engine("gauss"), wrong))
+    assert found is not None
+    assert "A and B" in found.text
+    assert found.numbers["after"] < 0.1 * found.numbers["before"]
 
 
 def described_run(folder: Path) -> Path:

@@ -19,8 +19,9 @@ _CANDIDATES = 16
 _MOST = 8
 """Starting points, at most."""
 _ITERATIONS = 30
-_GAIN, _CLOSE = 1e-3, 1e-6
-"""Poses are found where a step promises to lower the squared error by less than this part, or the error is less."""
+_GAIN, _ROUND_OFF = 1e-3, 1e-9
+"""Poses are found where a step promises to lower the squared error by less than this part; an error below this [m] that
+does not halve is round-off."""
 _FIRST_SAMPLES = 5
 _SAME = 1e-3
 """Two poses are the same if no parameter differs by more than this fraction of its range."""
@@ -107,7 +108,7 @@ def _poses(model: ForwardModel, name: str, middle: Array, angles: list[int], pos
         return _pose_error(model, name, placed, angles, pose)
 
     found = levenberg_marquardt(
-        evaluate, damped_steps, points[:, angles], gain=_GAIN, close=_CLOSE, most=_ITERATIONS,
+        evaluate, damped_steps, points[:, angles], gain=_GAIN, round_off=_ROUND_OFF, most=_ITERATIONS,
         move=lambda at, step: np.clip(at + step, model.lower[angles], model.upper[angles]),
     )  # fmt: skip
     points[:, angles] = found.points
