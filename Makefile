@@ -54,8 +54,9 @@ kernels: setup
 	@$(BIN)/python -m shoal.mechanics.warm
 
 # Of two cores three processes leave hardly any idle: some tests wait for a server, a service or another's compilation.
+# A file stays in one process, which makes its fixtures once; in order, as the longest files come early.
 test: kernels  ## the tests
-	@OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 3 --dist worksteal $(ARGS)
+	@OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 3 --dist loadfile --no-loadscope-reorder $(ARGS)
 
 lint: setup  ## style and format
 	@$(BIN)/ruff check

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -456,13 +456,26 @@ SCENES = [*(case.scene for case in CASES), *ONLY_NATIVE]
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """A test with `exudyn_case` or `casadi_case` runs for every case that the engine can do."""
+    """A test with `exudyn_case` or `casadi_case` runs for every case that the engine can do, by day for a few."""
     for engine in ("exudyn", "casadi"):
         if f"{engine}_case" in metafunc.fixturenames:
             able = [
                 case for case in CASES if {need for _, need in needs(case.scene)} <= get_engine(engine).capabilities.all
             ]
-            metafunc.parametrize(f"{engine}_case", able, ids=lambda case: case.scene.name)
+            daily = covering(able)
+            marked = [pytest.param(case, marks=[pytest.mark.slow] * (case.scene.name not in daily)) for case in able]
+            metafunc.parametrize(f"{engine}_case", marked, ids=[case.scene.name for case in able])
+
+
+def covering(cases: Sequence[Case]) -> set[str]:
+    """Names of a few scenes in which every capability occurs that any of these asks for: enough by day."""
+    wanted = {case.scene.name: {need for _, need in needs(case.scene)} for case in cases}
+    left, chosen = set().union(*wanted.values()), set[str]()
+    while left:
+        best = max(wanted, key=lambda name: len(wanted[name] & left))
+        chosen.add(best)
+        left -= wanted[best]
+    return chosen
 
 
 @pytest.fixture

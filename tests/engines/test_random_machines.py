@@ -18,7 +18,7 @@ from shoal.scene import Rod, Scene
 from shoal.trajectory import Trajectory
 
 Random = np.random.Generator
-FEW, MANY, DAMPED, DRAGGED = 3, 60, 100, 140
+FEW, MANY, DAMPED, DRAGGED = 1, 60, 100, 140
 
 
 def machine(seed: int) -> Scene:

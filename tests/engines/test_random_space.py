@@ -29,7 +29,7 @@ def test_no_answer_is_wrong_and_called_right(seed: int) -> None:
     assert found.verdict in FINE, found
 
 
-@pytest.mark.parametrize("seed", [6, 7, 8, 10])
+@pytest.mark.parametrize("seed", [6, *(pytest.param(one, marks=pytest.mark.slow) for one in (7, 8, 10))])
 def test_the_verdict_on_a_few_linkages_is_right(seed: int) -> None:
     found = judged(seed, "linkages")
     assert found.verdict == "right", found

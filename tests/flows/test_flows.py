@@ -295,6 +295,7 @@ def test_what_is_taken_from_the_library_is_kept_with_the_run(tmp_path: Path) -> 
     assert len(again.figures) > 5
 
 
+@pytest.mark.slow
 def test_a_scene_may_be_given_as_yaml() -> None:
     text = (files("shoal.scene") / "library" / "single-pendulum.yaml").read_text()
     found = run.run_flow("forward", {"scene": json.dumps(text)})

@@ -69,7 +69,14 @@ def test_both_elbow_branches_are_looked_at() -> None:
 OTHERS = ("auto", "casadi", "casadi-multiple", "multiple-shooting", "afsa")
 
 
-@pytest.mark.parametrize("method", [name for name in METHODS if name not in OTHERS])
+# By day test_methods.py finds parameters by every method.
+DAILY = ("least-squares", "iafsa")
+
+
+@pytest.mark.parametrize(
+    "method",
+    [pytest.param(name, marks=[pytest.mark.slow] * (name not in DAILY)) for name in METHODS if name not in OTHERS],
+)
 def test_every_native_method_finds_the_angles(method: str) -> None:
     estimate = run("paper-case-1", method, seed=1)
     for parameter, true in estimate.truth.items():

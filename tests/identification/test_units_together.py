@@ -95,7 +95,8 @@ def test_what_one_sensor_contradicts_is_seen(seed: int) -> None:
     assert "tilt" in found.message
 
 
-@pytest.mark.parametrize("spring", [0.4, pytest.param(0.8, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("spring", [0.4, 0.8])
 def test_a_spring_that_was_left_out_is_a_suspect(spring: float) -> None:
     """The inertia takes most of it, and was trusted at half or a quarter of the truth."""
     found = identified(ENCODER_AND_IMU, 2, spring=spring)

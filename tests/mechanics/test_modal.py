@@ -119,7 +119,9 @@ def test_chains_move_as_lagrange_says(seed: int) -> None:
     assert np.max(np.abs(_ends(scene) - judge.motion(*chain, TIMES, 9.81))) < 1e-8
 
 
-@pytest.mark.parametrize(("seed", "step"), [(0, 5e-5), (1, 2.5e-5), (2, 1e-4)])
+@pytest.mark.parametrize(
+    ("seed", "step"), [(2, 1e-4), *(pytest.param(*one, marks=pytest.mark.slow) for one in ((0, 5e-5), (1, 2.5e-5)))]
+)
 def test_chains_move_as_exudyns_floating_frames_do(seed: int, step: float) -> None:
     """Its step has the second order, which two of them take away."""
     pytest.importorskip("exudyn")

@@ -32,8 +32,11 @@ from thrown import ALONG, THROWN, UP
 @pytest.mark.parametrize(
     "state",
     [
-        *("a plane, 1e-7", "four branches"),
-        *(pytest.param(name, marks=pytest.mark.slow) for name in ("curved away", "two unequal design points")),
+        "a plane, 1e-7",
+        *(
+            pytest.param(name, marks=pytest.mark.slow)
+            for name in ("four branches", "curved away", "two unequal design points")
+        ),
     ],
 )
 def test_probabilities_of_closed_forms(state: str) -> None:

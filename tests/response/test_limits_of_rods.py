@@ -79,6 +79,7 @@ def test_a_section_where_the_load_is_a_number_in_a_table() -> None:
     assert strain == pytest.approx(0.01 - curvature * THICK / 2, abs=5e-3 * curvature * THICK / 2)
 
 
+@pytest.mark.slow
 def test_sections_of_rods_in_space_are_those_of_cables_in_the_plane() -> None:
     """A soft rod swings in a plane: director rods share no element with cables, whose sections closed forms hold."""
     rod = {"kind": "rod", "length": LENGTH, "height": 0.02, "width": 0.02, "density": 1000.0, "youngs_modulus": 1e7}

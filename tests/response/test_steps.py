@@ -61,6 +61,7 @@ def expected_beyond(count: int, limit: float) -> float:
     return beyond + count * float(special.ndtr(-(limit - STIFF) / 2000))
 
 
+@pytest.mark.slow
 def test_a_tail_beyond_the_stable_step() -> None:
     """Stiffness known to 20 %: many runs take smaller steps. The soft body's motion is in closed form.
 

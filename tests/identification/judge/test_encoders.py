@@ -70,6 +70,7 @@ def test_outliers_that_a_robust_loss_sets_aside_refute_no_model(noise: str, tmp_
     assert answer(tmp_path, table, more=noise).verdict is Verdict.REJECTED
 
 
+@pytest.mark.slow
 def test_a_robust_loss_accepts_no_wrong_model(tmp_path: Path) -> None:
     table = recorded()
     table[:, 1] += 0.05 * np.sin(9 * TIMES)

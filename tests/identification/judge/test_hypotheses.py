@@ -300,12 +300,12 @@ def check_right_models(kind: str, seeds: range, folder: Path) -> None:
 
 @pytest.mark.parametrize("kind", ["pendulum", pytest.param("torsion", marks=pytest.mark.slow)])
 def test_a_hidden_fault_is_named_or_the_model_is_rejected(kind: str, tmp_path: Path) -> None:
-    check_faults(kind, range(10, 13), tmp_path)
+    check_faults(kind, range(10, 11), tmp_path)
 
 
 @pytest.mark.parametrize("kind", ["pendulum", pytest.param("torsion", marks=pytest.mark.slow)])
 def test_right_models_are_kept(kind: str, tmp_path: Path) -> None:
-    check_right_models(kind, range(100, 103), tmp_path)
+    check_right_models(kind, range(100, 101), tmp_path)
 
 
 @pytest.mark.slow
@@ -320,6 +320,7 @@ def test_many_right_models_are_kept(kind: str, tmp_path: Path) -> None:
     check_right_models(kind, range(100, 140), tmp_path)
 
 
+@pytest.mark.slow
 def test_a_wrong_mass_that_hardly_shows_is_no_answer(tmp_path: Path) -> None:
     """The residual is like noise in size and whiteness, and an inertia of the wrong model is far off."""
     case = drawn("double", 2, tmp_path, faulty=True, off=("i1", -0.06))

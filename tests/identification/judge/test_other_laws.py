@@ -60,7 +60,9 @@ def identified(law: str, noise: float, seed: int, share: float = 1.0, *more: str
 
 
 @pytest.mark.parametrize("draws", [[1], pytest.param(range(2, 15), marks=pytest.mark.slow)], ids=["one", "many"])
-@pytest.mark.parametrize(("law", "share"), [("quadratic drag", 0.3), ("dry friction", 0.5)])
+@pytest.mark.parametrize(
+    ("law", "share"), [("quadratic drag", 0.3), pytest.param("dry friction", 0.5, marks=pytest.mark.slow)]
+)
 def test_intervals_hold_the_friction_where_another_law_leaves_a_misfit(
     law: str, share: float, draws: Sequence[int]
 ) -> None:

@@ -67,7 +67,10 @@ def fitted(folder: Path, rate: float, smooth: bool = True, noise: float | None =
     return identify(Problem.parse(stated if noise is None else {**stated, "noise": noise}, "driven"))
 
 
-@pytest.mark.parametrize(("smooth", "noise"), [(True, None), (True, 2e-5), (False, None)])
+@pytest.mark.parametrize(
+    ("smooth", "noise"),
+    [(True, 2e-5), *(pytest.param(*one, marks=pytest.mark.slow) for one in ((True, None), (False, None)))],
+)
 def test_intervals_hold_the_truth_though_the_drive_was_sampled_coarsely(
     tmp_path: Path, smooth: bool, noise: float | None
 ) -> None:
