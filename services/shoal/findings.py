@@ -65,9 +65,8 @@ class Finding:
 
     def to_json(self) -> dict[str, Any]:
         """Return code, severity, text, numbers and what to do."""
-        steps = [*self.steps, *([self.kind.remedy] if self.kind.remedy else [])]
-        numbers = plain(dict(self.numbers))
-        return {"code": self.code, "severity": str(self.severity), "text": self.text, "numbers": numbers, "do": steps}
+        said = {"code": self.code, "severity": str(self.severity), "text": self.text}
+        return {**said, "numbers": plain(self.numbers), "do": steps([self])}
 
 
 def message(findings: Iterable[Finding]) -> str:
