@@ -3,66 +3,63 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from shoal.engines.tree.description import FREEDOMS, SpatialChain
+from shoal.engines.tree.march import TreeRun, march
+from shoal.engines.tree.tableau import DOPRI853, RK4
+from shoal.engines.tree.tree import COORDINATES, FIXED, PRISMATIC, RATES, REVOLUTE, SPHERICAL, Tree, room
+
+KINDS = {"fixed": FIXED, "revolute": REVOLUTE, "prismatic": PRISMATIC, "spherical": SPHERICAL}
 
 
-def _tree(kinds: list[str], seed: int, **more: Any) -> SpatialChain:
+class RandomTree(NamedTuple):
+    """A tree and a state."""
+
+    tree: Tree
+    q: Any
+    v: Any
+
+    def run(self, times: Any, step: float | None = None, tolerance: float = 0.0) -> TreeRun:
+        """Its motion from this state, by a fixed step or to a tolerance."""
+        state, method = np.concatenate([self.q, self.v, [0.0]]), RK4 if step else DOPRI853
+        found: TreeRun = march(
+            self.tree, room(self.tree), method, state, np.array(times, dtype=float), step or 0.0, tolerance
+        )
+        return found
+
+
+def _tree(kinds: list[str], seed: int) -> RandomTree:
     """A random tree with one joint of each kind in the list, in that order, at a random state."""
-    draw = np.random.default_rng(seed)
-    bodies: dict[str, Any] = {}
-    joints: dict[str, Any] = {}
-    initial: dict[str, Any] = {}
-
-    def vector() -> list[float]:
-        return draw.normal(size=3).tolist()
-
-    for k, kind in enumerate(kinds):
+    draw, count = np.random.default_rng(seed), 1 + len(kinds)
+    number = np.array([FIXED, *(KINDS[kind] for kind in kinds)])
+    mass, lever, inertia = np.zeros(count), np.zeros((count, 3)), np.zeros((count, 6))
+    parents, q, v, damping = np.zeros(count, dtype=np.int64), [], [], []
+    for k in range(1, count):
+        parents[k] = draw.integers(max(0, k - 3), k)
+        mass[k], lever[k] = draw.uniform(0.5, 2.0), draw.normal(size=3)
         a, b = draw.uniform(0.5, 1.0, 2)
-        turn = Rotation.from_rotvec(vector()).as_matrix()
-        inertia = turn @ np.diag([a, b, draw.uniform(abs(a - b) + 0.05, a + b - 0.05)]) @ turn.T
-        bodies[f"B{k}"] = {
-            "mass": draw.uniform(0.5, 2.0),
-            "inertia": ((inertia + inertia.T) / 2).tolist(),
-            "centre_of_mass": vector(),
-        }
-        freedoms = FREEDOMS[kind]
-        joints[f"J{k}"] = {
-            "kind": kind,
-            "body": f"B{k}",
-            "parent": "ground" if k == 0 else f"B{draw.integers(max(0, k - 3), k)}",
-            "on_parent": {"position": vector(), "rotation": vector()},
-            "on_body": {"position": vector(), "rotation": vector()},
-            "load": draw.normal(size=freedoms).tolist(),
-            **({"damping": draw.uniform(0.0, 0.5)} if freedoms else {}),
-            **({"axis": vector()} if freedoms == 1 else {}),
-        }
-        initial[f"J{k}"] = {
-            "coordinate": draw.normal(size=freedoms).tolist(),
-            "rate": draw.normal(size=freedoms).tolist(),
-        }
-    loads = {f"L{k}": {"body": f"B{k}", "position": vector(), "force": vector(), "torque": vector()} for k in (0, 1)}
-    points = {f"P{k}": {"body": f"B{k}", "position": vector()} for k in range(len(kinds))}
-    return SpatialChain.model_validate(
-        {
-            "name": "tree",
-            "gravity": vector(),
-            "bodies": bodies,
-            "joints": joints,
-            "initial": initial,
-            "loads": loads,
-            "points": points,
-            **more,
-        }
-    )
+        turn = Rotation.random(rng=draw).as_matrix()
+        about = turn @ np.diag([a, b, draw.uniform(abs(a - b) + 0.05, a + b - 0.05)]) @ turn.T
+        about += mass[k] * (lever[k] @ lever[k] * np.eye(3) - np.outer(lever[k], lever[k]))
+        inertia[k] = about[[0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]]
+        rates = RATES[number[k]]
+        damping.append(np.full(rates, draw.uniform(0.0, 0.5) if rates == 1 else 0.0))
+        v.append(draw.normal(size=rates))
+        q.append(Rotation.random(rng=draw).as_quat(scalar_first=True) if rates == 3 else draw.normal(size=rates))
+    first_q, first_v = (np.cumsum([0, *(size[kind] for kind in number)])[:-1] for size in (COORDINATES, RATES))
+    turns = np.stack([np.eye(3), *Rotation.random(count - 1, rng=draw).as_matrix()]).reshape(count, 9)
+    tree = Tree(
+        parents, number, first_q, first_v, draw.normal(size=(count, 3)), turns, mass, lever, inertia,
+        np.concatenate(damping), draw.normal(size=3), np.array([1, count - 1]), *draw.normal(size=(3, 2, 3)),
+    )  # fmt: skip
+    return RandomTree(tree, np.concatenate(q), np.concatenate(v))
 
 
 @pytest.fixture(scope="session")
-def random_tree() -> Callable[..., SpatialChain]:
+def random_tree() -> Callable[..., RandomTree]:
     """Makes a random tree."""
     return _tree
 

@@ -29,14 +29,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
+from shoal.engines import get_engine
 from shoal.engines.exudyn.build import library
 from shoal.engines.prepared import Prepared
 from shoal.engines.tree.articulated import accelerate
-from shoal.engines.tree.description import SpatialChain
 from shoal.engines.tree.march import march
-from shoal.engines.tree.simulate import simulate
+from shoal.engines.tree.scene import SceneTree
 from shoal.engines.tree.tableau import RK4
-from shoal.engines.tree.tree import build, room
+from shoal.engines.tree.tree import room
 from shoal.scene import Scene
 
 from shoal_validation.benchmarks.timing import median_time
@@ -61,28 +61,29 @@ class ChainRow:
     gap: float
 
 
-def chain(bodies: int) -> SpatialChain:
+def turns(bodies: int) -> list[Array]:
+    """Axes of the links at the start, as columns, (3, 3) each."""
+    found = [np.eye(3)]
+    for k, angle in enumerate(_angles(bodies)):
+        found.append(found[-1] @ Rotation.from_rotvec(angle * np.array(_axis(k))).as_matrix())
+    return found[1:]
+
+
+def chain(bodies: int) -> Scene:
     """Links of 1 m along x, joints about y and z in turn, at angles of 0.1 sin k."""
-    return SpatialChain.model_validate(
-        {
-            "name": f"chain-{bodies}",
-            "gravity": GRAVITY,
-            "bodies": {
-                f"B{k}": {"mass": 1.0, "inertia": MOMENTS, "centre_of_mass": [0.5, 0, 0]} for k in range(bodies)
-            },
-            "joints": {
-                f"J{k}": {
-                    "body": f"B{k}",
-                    "parent": f"B{k - 1}" if k else "ground",
-                    "axis": _axis(k),
-                    "on_parent": {"position": [1.0 if k else 0.0, 0.0, 0.0]},
-                }
-                for k in range(bodies)
-            },
-            "initial": {f"J{k}": {"coordinate": angle} for k, angle in enumerate(_angles(bodies))},
-            "points": {"tip": {"body": f"B{bodies - 1}", "position": [1.0, 0.0, 0.0]}},
-        }
-    )
+    before: dict[str, Any] = {"body": "ground", "point": [0.0, 0.0, 0.0]}
+    parts: dict[str, Any] = {"bodies": {}, "joints": {}, "initial": {}}
+    for k, turn in enumerate(turns(bodies)):
+        name = f"B{k}"
+        parts["bodies"][name] = {"kind": "rigid-body", "mass": 1.0, "inertia": MOMENTS, "centre_of_mass": [0.5, 0, 0],
+                                 "named_points": {"end": [1.0, 0.0, 0.0]}}  # fmt: skip
+        parts["joints"][f"J{k}"] = {"kind": "revolute", "first": before, "second": {"body": name},
+                                    "axis": (turn @ _axis(k)).tolist()}  # fmt: skip
+        parts["initial"][name] = {"rotation": Rotation.from_matrix(turn).as_rotvec().tolist(), "spin": [0, 0, 0]}
+        before = {"body": name, "point": "end"}
+    scene = {"name": f"chain-{bodies}", "dimensions": 3, "gravity": GRAVITY, "markers": {"tip": before},
+             "solver": {"integrator": "rk4", "step": STEP, "duration": STEP}}  # fmt: skip
+    return Scene.parse(scene | parts)
 
 
 def measure(sizes: tuple[int, ...] = BODIES, repeats: int = 5) -> Iterator[ChainRow]:
@@ -105,38 +106,27 @@ def measure(sizes: tuple[int, ...] = BODIES, repeats: int = 5) -> Iterator[Chain
 
 def own_acceleration(bodies: int) -> float:
     """Seconds of one call of the articulated-body recursion."""
-    model = build(chain(bodies))
+    model = SceneTree(chain(bodies))
     work, out = room(model.tree), np.zeros(bodies)
-    return median_time(lambda: accelerate(model.tree, work, model.q0, model.v0, out), 200)
+    return median_time(lambda: accelerate(model.tree, work, model.q, model.v, out), 200)
 
 
 def own_step(bodies: int, steps: int, repeats: int) -> tuple[float, Callable[[float], Array]]:
     """Seconds a step of the compiled loop; and where the tip is at a given time."""
-    what = chain(bodies)
-    model = build(what)
+    scene = chain(bodies)
+    model = SceneTree(scene)
     work, end = room(model.tree), np.array([steps * STEP])
 
     def run() -> None:
-        march(model.tree, work, RK4, np.concatenate([model.q0, model.v0, [0.0]]), end, STEP, 0.0)
+        march(model.tree, work, RK4, np.concatenate([model.q, model.v, [0.0]]), end, STEP, 0.0)
 
-    return median_time(run, repeats) / steps, lambda at: simulate(what, [at], step=STEP).point("tip")[0]
+    return median_time(run, repeats) / steps, lambda at: get_engine("tree").simulate(scene, [at]).marker("tip")[0]
 
 
 def natural_run(bodies: int, steps: int, repeats: int) -> tuple[float, Array]:
-    """Seconds a step of the same chain as a scene, and the tip at the end."""
-    start, before = simulate(chain(bodies), [0.0], step=STEP), {"body": "ground", "point": [0.0, 0.0, 0.0]}
-    parts: dict[str, Any] = {"bodies": {}, "joints": {}, "initial": {}}
-    for k in range(bodies):
-        name, turn = f"B{k}", start.rotation(f"B{k}")[0]
-        parts["bodies"][name] = {"kind": "rigid-body", "mass": 1.0, "inertia": MOMENTS, "centre_of_mass": [0.5, 0, 0],
-                                 "named_points": {"end": [1.0, 0.0, 0.0]}}  # fmt: skip
-        parts["joints"][f"J{k}"] = {"kind": "revolute", "first": before, "second": {"body": name},
-                                    "axis": (turn @ _axis(k)).tolist()}  # fmt: skip
-        parts["initial"][name] = {"rotation": Rotation.from_matrix(turn).as_rotvec().tolist(), "spin": [0, 0, 0]}
-        before = {"body": name, "point": "end"}
-    solver = {"integrator": "rk4", "step": STEP, "duration": steps * STEP}
-    scene = {"name": "chain", "dimensions": 3, "gravity": GRAVITY, "markers": {"tip": before}, "solver": solver}
-    run, few = Prepared(Scene.parse(scene | parts), threads=1), steps // 4
+    """Seconds a step of the same chain by the native solver, and the tip at the end."""
+    scene = chain(bodies).with_values({"solver.duration": steps * STEP})
+    run, few = Prepared(scene, threads=1), steps // 4
     longer, shorter = (median_time(partial(run, times=[n * STEP]), repeats) for n in (steps, few))
     found = run(times=[steps * STEP])
     if not found.ok:
@@ -219,12 +209,10 @@ def exudyn_bodies_run(bodies: int, steps: int, repeats: int) -> tuple[float, Arr
     exu = library()
     from exudyn import rigidBodyUtilities
 
-    start = simulate(chain(bodies), [0.0], step=STEP)
     container = exu.SystemContainer()
     mbs = container.AddSystem()
     before, place = mbs.CreateGround(), np.zeros(3)
-    for k in range(bodies):
-        turn = start.rotation(f"B{k}")[0]
+    for k, turn in enumerate(turns(bodies)):
         body = mbs.CreateRigidBody(
             inertia=rigidBodyUtilities.RigidBodyInertia(mass=1.0, inertiaTensor=np.diag(MOMENTS), com=[0.0, 0.0, 0.0]),
             referencePosition=place + 0.5 * turn[:, 0],

@@ -84,11 +84,7 @@ def reduce(tree: Tree, w: Room, v: Array) -> None:
         if kind == SPHERICAL:
             # D = [1; 0] in the fixed axes; afterwards the parent meets neither A nor B.
             own = inverse(A)
-            free = (tree.drive[k] - tree.damping[k] * v[k],
-                    tree.drive[k + 1] - tree.damping[k + 1] * v[k + 1],
-                    tree.drive[k + 2] - tree.damping[k + 2] * v[k + 2])  # fmt: skip
-            applied = multiply(matrix(w.rotation, i), free)
-            rest = multiply_symmetric(own, subtract(applied, torque))
+            rest = scale(-1.0, multiply_symmetric(own, torque))
             put_symmetric(w.turn_share, i, own)
             put_matrix(w.speed_share, i, B)
             put(w.rest, i, rest)
@@ -96,7 +92,7 @@ def reduce(tree: Tree, w: Room, v: Array) -> None:
             A, B = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
             force = add(force, multiply_transposed(matrix(w.speed_share, i), rest))
             force = add(force, multiply_symmetric(C, speed_bias))
-            torque = applied
+            torque = (0.0, 0.0, 0.0)
         else:
             if kind in (REVOLUTE, PRISMATIC):
                 axis = third_axis(w, i)
@@ -107,7 +103,7 @@ def reduce(tree: Tree, w: Room, v: Array) -> None:
                     upper, lower = multiply(B, axis), multiply_symmetric(C, axis)
                     felt, along = dot(axis, lower), dot(axis, force)
                 share = 1.0 / felt
-                rest = share * (tree.drive[k] - tree.damping[k] * v[k] - along)
+                rest = -share * (tree.damping[k] * v[k] + along)
                 A, C = minus_square(A, share, upper), minus_square(C, share, lower)
                 B = minus_outer(B, share, upper, lower)
                 torque, force = add_scaled(torque, rest, upper), add_scaled(force, rest, lower)

@@ -1,6 +1,6 @@
 """The time loop: explicit Runge-Kutta steps of fixed or controlled size that end on every requested time.
 
-The state is y = [q, v, work], where `work` is what applied torques, dampers and loads have done [J], so that
+The state is y = [q, v, work], where `work` is what dampers and loads have done [J], so that
 kinetic + potential - work stays what it was.
 """
 
@@ -42,7 +42,7 @@ class TreeRun(NamedTuple):
 @njit(**OPTIONS)
 def rate(tree: Tree, w: Room, y: Array, out: Array) -> None:
     """out = dy/dt."""
-    split, end = y.size - 1 - tree.drive.size, y.size - 1
+    split, end = y.size - 1 - tree.damping.size, y.size - 1
     q, v = y[:split], y[split:end]
     accelerate(tree, w, q, v, out[split:end])
     coordinate_rates(tree, q, v, out[:split])

@@ -99,10 +99,10 @@ def energies(tree: Tree, w: Room) -> tuple[float, float]:
 
 @njit(**OPTIONS)
 def power(tree: Tree, w: Room, v: Array) -> float:
-    """Power [W] of applied torques, dampers and loads."""
+    """Power [W] of dampers and loads."""
     total = 0.0
     for k in range(v.size):
-        total += (tree.drive[k] - tree.damping[k] * v[k]) * v[k]
+        total -= tree.damping[k] * v[k] * v[k]
     for n in range(tree.load_body.size):
         i = tree.load_body[n]
         omega = vector(w.turning, i)

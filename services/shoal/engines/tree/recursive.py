@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from shoal.engines.tree.tree import PRISMATIC, REVOLUTE, SPHERICAL, Array, Tree
+from shoal.engines.tree.tree import PRISMATIC, RATES, REVOLUTE, SPHERICAL, Array, Tree
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ def equations(tree: Tree, q: Array, v: Array) -> Equations:
     turns = np.tile(np.eye(3), (n + 1, 1, 1))
     for j in range(1, n + 1):
         i = tree.parents[j]
-        own = slice(tree.first_v[j], tree.first_v[j] + _freedoms(tree.kinds[j]))
+        own = slice(tree.first_v[j], tree.first_v[j] + RATES[tree.kinds[j]])
         turns[j], arm, D = _joint(tree, j, turns[i], q)
         T = np.block([[np.eye(3), np.zeros((3, 3))], [-tilde(arm), np.eye(3)]])
         S[j] = T @ S[i] + D @ v[own]  # (2)
@@ -56,7 +56,7 @@ def equations(tree: Tree, q: Array, v: Array) -> Equations:
         H_dot[j][:, own] += D_dot
 
     M, C = np.zeros((len(v), len(v))), np.zeros((len(v), len(v)))
-    F: Array = tree.drive - tree.damping * v
+    F: Array = -tree.damping * v
     for j in range(1, n + 1):
         lever = turns[j] @ tree.lever[j]
         R, omega = _inertia(tree, j, turns[j], lever), S[j, :3]
@@ -106,7 +106,3 @@ def _inertia(tree: Tree, j: int, turn: Array, lever: Array) -> Array:
     about_origin = turn @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ turn.T
     moment = tree.mass[j] * tilde(lever)
     return np.block([[about_origin, moment], [moment.T, tree.mass[j] * np.eye(3)]])
-
-
-def _freedoms(kind: int) -> int:
-    return 3 if kind == SPHERICAL else int(kind in (REVOLUTE, PRISMATIC))

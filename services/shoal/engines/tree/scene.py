@@ -9,16 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from shoal.engines.poses import initial_poses
-from shoal.engines.tree.description import (
-    JointFrame,
-    JointState,
-    Load,
-    Place,
-    SpatialBody,
-    SpatialChain,
-    SpatialJoint,
-    Vector3,
-)
+from shoal.engines.tree.tree import COORDINATES, FIXED, PRISMATIC, RATES, REVOLUTE, SPHERICAL, Tree
 from shoal.errors import InputError
 from shoal.mechanics.assembly.masses import second_moments
 from shoal.mechanics.assembly.space.start import place_started
@@ -53,90 +44,127 @@ class BodyStart:
 
 
 class SceneTree:
-    """The tree of a scene, and the start of its bodies as the native machine has it.
+    """The tree of a scene, and the start of its bodies as the native machine has it. Raises InputError.
 
-    chain: bodies in their scene's frames; joints' frames are turned as the ground's at the start. Raises InputError.
+    rows: row of the tree of every body; tree: its numbers; q, v: coordinates and rates at the start
     initial: the start of every body as it is used
     """
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
         self._begin, self._axis, self.initial = started(scene)
-        joints: dict[str, Any] = {}
-        states: dict[str, Any] = {}
-        for name, parent, child in _links(scene):
-            joints[name], states[name] = self._joint(name, parent, child)
-        self.chain = SpatialChain(
-            name=scene.name,
-            gravity=padded(scene.gravity, 3),
-            bodies={name: _body(body, span(scene)) for name, body in scene.bodies.items()},
-            joints=joints,
-            points={name: Place(body=at.body, position=self._place(at)) for name, at in scene.markers.items()},
-            loads={name: self._load(name, load) for name, load in scene.loads.items()},
-            initial=states,
+        links = _links(scene)
+        self.rows = {GROUND: 0} | {child.body: row for row, (_, _, child) in enumerate(links, start=1)}
+        count = len(self.rows)
+        # Of the moved frames at the start: their origins, and their axes as columns.
+        self._origins, self._axes = np.zeros((count, 3)), np.tile(np.eye(3), (count, 1, 1))
+        parents, kinds = np.zeros(count, dtype=np.int64), np.full(count, FIXED)
+        mass, lever, inertia = np.zeros(count), np.zeros((count, 3)), np.zeros((count, 3, 3))
+        rates, damping = [np.zeros(0)], [np.zeros(0)]
+        for row, (name, parent, child) in enumerate(links, start=1):
+            body = scene.bodies[child.body]
+            assert not isinstance(body, PointMass)
+            where = self._begin[child.body].point(self._place(child))
+            kinds[row], axes, rate, friction = self._joint(name, self._begin[parent.body], child.body, where)
+            parents[row], self._origins[row], self._axes[row] = self.rows[parent.body], where, axes
+            rates.append(rate)
+            damping.append(np.full(len(rate), friction))
+            mass[row] = body.mass
+            lever[row] = self.moved(child.body, np.array(padded(body.centre_of_mass, 3)))
+            turn = axes.T @ self._begin[child.body].axes
+            arm = lever[row]
+            about_centre = turn @ _inertia(body, span(scene)) @ turn.T
+            inertia[row] = about_centre + mass[row] * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+        # Of every joint in the moved frame of the parent.
+        back = self._axes[parents].transpose(0, 2, 1)
+        offset = np.einsum("nij,nj->ni", back, self._origins - self._origins[parents])
+        loads = [self._load(name, load) for name, load in scene.loads.items()]
+        first_q, first_v = (np.cumsum([0, *(size[kind] for kind in kinds)])[:-1] for size in (COORDINATES, RATES))
+        self.tree = Tree(
+            parents,
+            kinds,
+            first_q,
+            first_v,
+            offset,
+            (back @ self._axes).reshape(count, 9),
+            mass,
+            lever,
+            np.ascontiguousarray(inertia[:, [0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]]),
+            np.concatenate(damping),
+            np.array(padded(scene.gravity, 3), dtype=float),
+            np.array([row for row, *_ in loads], dtype=np.int64),
+            *(np.array([load[k] for load in loads], dtype=float).reshape(-1, 3) for k in (1, 2, 3)),
         )
+        self.v = np.concatenate(rates)
+        self.q = np.zeros(sum(COORDINATES[kind] for kind in kinds))
+        self.q[first_q[kinds == SPHERICAL]] = 1.0
 
-    def _place(self, at: Attachment) -> Vector3:
-        x, y, z = (float(part) for part in padded(self.scene.location(at), 3))
-        return x, y, z
+    def moved(self, body: str, place: Array) -> Array:
+        """Return a place of a body [m] in its moved frame."""
+        row = self.rows[body]
+        return np.asarray(self._axes[row].T @ (self._begin[body].point(place) - self._origins[row]))
 
-    def _joint(self, name: str, parent: Attachment, child: Attachment) -> tuple[SpatialJoint, JointState]:
-        joint = self.scene.joints[name]
-        one, other = self._begin[parent.body], self._begin[child.body]
-        where = other.point(np.array(self._place(child)))
-        frames = [
-            JointFrame(position=tuple(side.back(where)), rotation=tuple(Rotation.from_matrix(side.axes.T).as_rotvec()))
-            for side in (one, other)
-        ]
-        turning, speed = other.spin - one.spin, other.speed(where) - one.speed(where)
-        kind, axis, rate, damping = "fixed", None, None, 0.0
+    def marker(self, at: Attachment) -> Array:
+        """Return an attachment [m] in the moved frame of its body."""
+        return self.moved(at.body, self._place(at))
+
+    def first_axis(self, body: str) -> Array:
+        """Return the direction of a body's x axis in its moved frame."""
+        return np.asarray(self._axes[self.rows[body]].T @ self._begin[body].axes[:, 0])
+
+    def _place(self, at: Attachment) -> Array:
+        return np.array([float(part) for part in padded(self.scene.location(at), 3)])
+
+    def _joint(self, name: str, parent: BodyStart, child: str, where: Array) -> tuple[int, Array, Array, float]:
+        """Kind, axes at the start of which the third is the joint's, rates and friction of the joint at a point."""
+        joint, body = self.scene.joints[name], self._begin[child]
+        turning, speed = body.spin - parent.spin, body.speed(where) - parent.speed(where)
         if isinstance(joint, Spherical):
-            kind, rate = "spherical", tuple(turning)
-        elif isinstance(joint, Revolute):
-            direction = self._axis(joint.first, joint.axis)
-            kind, axis, rate, damping = "revolute", tuple(direction), (float(turning @ direction),), joint.friction
-        elif isinstance(joint, Slider):
+            return SPHERICAL, np.eye(3), turning, 0.0
+        if isinstance(joint, Revolute):
+            axes = _with_third(self._axis(joint.first, joint.axis))
+            return REVOLUTE, axes, turning @ axes[:, 2:], joint.friction
+        if isinstance(joint, Slider):
             if joint.rotation != "locked":
                 raise InputError(f"joints.{name}.rotation: engine tree slides bodies that do not turn; use gauss")
-            along = joint.axis
-            if along is None:
+            if joint.axis is None:
                 line = np.array([np.cos(joint.direction), np.sin(joint.direction), 0.0])
-                direction = self._begin[joint.first.body].axes @ line
+                axes = _with_third(self._begin[joint.first.body].axes @ line)
             else:
-                direction = self._axis(joint.first, along)
-            kind, axis, rate, damping = "prismatic", tuple(direction), (float(speed @ direction),), joint.friction
-        made = SpatialJoint.model_validate(
-            {"body": child.body, "parent": parent.body, "kind": kind, "axis": axis, "damping": damping,
-             "on_parent": frames[0], "on_body": frames[1]}
-        )  # fmt: skip
-        return made, JointState(rate=rate)
+                axes = _with_third(self._axis(joint.first, joint.axis))
+            return PRISMATIC, axes, speed @ axes[:, 2:], joint.friction
+        return FIXED, np.eye(3), np.zeros(0), 0.0
 
-    def _load(self, name: str, load: Any) -> Load:
+    def _load(self, name: str, load: Any) -> tuple[int, Array, Array, Array]:
+        """Return the row, the place in the moved frame [m], the force [N] and the torque [N m] of a load."""
+        row, place, none = self.rows[load.at.body], self.marker(load.at), np.zeros(3)
         if isinstance(load, Force):
             if load.follows:
                 raise InputError(f"loads.{name}.follows: engine tree knows forces of fixed direction; use gauss")
-            scale = float(load.scale.number or 0.0)
-            force = tuple(scale * float(part) for part in padded(load.force, 3))
-            return Load(body=load.at.body, position=self._place(load.at), force=force)
+            return row, place, float(load.scale.number or 0.0) * np.array(padded(load.force, 3)), none
         assert isinstance(load, Torque)
         if load.reaction is not None and load.reaction.body != GROUND:
             raise InputError(f"loads.{name}.reaction: engine tree knows torques that the ground takes; use gauss")
         axis = np.array(load.axis) / np.linalg.norm(load.axis)
-        return Load(body=load.at.body, torque=tuple(float(load.torque.number or 0.0) * axis))
+        return row, place, none, float(load.torque.number or 0.0) * axis
 
 
 THINNEST = 1e-14
 """Of mass times size squared: the least moment of inertia, as the recursion needs one about every axis."""
 
 
-def _body(body: Any, size: float) -> SpatialBody:
-    """Mass, inertia and centre of a rigid body, in its frame; size: of the machine [m]."""
-    assert not isinstance(body, PointMass)
+def _inertia(body: Any, size: float) -> Array:
+    """Inertia of a rigid body about its centre of mass [kg m^2], (3, 3); size: of the machine [m]."""
     moments = np.array(second_moments(body), dtype=float)
-    inertia = np.trace(moments) * np.eye(3) - moments + THINNEST * body.mass * size**2 * np.eye(3)
-    return SpatialBody.model_validate(
-        {"mass": body.mass, "inertia": inertia.tolist(), "centre_of_mass": padded(body.centre_of_mass, 3)}
-    )
+    return np.asarray((np.trace(moments) + THINNEST * body.mass * size**2) * np.eye(3) - moments)
+
+
+def _with_third(axis: Array) -> Array:
+    """Axes as columns of which the third is a unit vector."""
+    other = np.eye(3)[np.argmin(np.abs(axis))]
+    first = np.cross(other, axis)
+    first /= np.linalg.norm(first)
+    return np.column_stack([first, np.cross(axis, first), axis])
 
 
 def started(scene: Scene) -> tuple[dict[str, BodyStart], Any, dict[str, InitialState]]:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.integrate import DOP853
 
 from shoal.engines.tree.tree import Array
+from shoal.mechanics.integrators.dop853_tableau import ERROR_3, ERROR_5, STAGES, WEIGHTS
 
 
 class Tableau(NamedTuple):
@@ -36,13 +36,12 @@ RK4 = Tableau(
 )
 """The classical method of order 4."""
 
-_STAGES = len(DOP853.B)
 DOPRI853 = Tableau(
-    np.ascontiguousarray(DOP853.A[:_STAGES, :_STAGES], dtype=float),
-    np.ascontiguousarray(DOP853.B, dtype=float),
-    np.ascontiguousarray(DOP853.E5, dtype=float),
-    np.ascontiguousarray(DOP853.E3, dtype=float),
+    np.ascontiguousarray(WEIGHTS[:STAGES, :STAGES]),
+    np.ascontiguousarray(WEIGHTS[STAGES, :STAGES]),
+    ERROR_5,
+    ERROR_3,
     8,
     7,
 )
-"""Dormand and Prince of order 8 with error control (Hairer, Norsett, Wanner 1993, section II.10), from scipy."""
+"""Dormand and Prince of order 8 with error control (Hairer, Norsett, Wanner 1993, section II.10)."""
