@@ -21,7 +21,7 @@ from typing import Any
 from numba.core import caching, config, dispatcher, event
 from numba.core.compiler_lock import global_compiler_lock
 
-from shoal.compile import clock, content, linking
+from shoal.compile import clock, content, linking, operators
 from shoal.compile.progress import report
 from shoal.compile.structures import Reference
 from shoal.errors import FULL, ComputationError
@@ -162,8 +162,9 @@ def _save(self: Any, sig: Any, data: Any) -> None:
 
 @cache
 def install() -> None:
-    """Install: from now on compile under locks, link parts (`linking`) and report (`progress`)."""
+    """Install: from now on compile under locks, with `linking` and `operators`, and report (`progress`)."""
     linking.install()
+    operators.install()
     dispatcher.Dispatcher.compile = _compile  # type: ignore[method-assign]
     caching.Cache.save_overload = _save
     event.register("numba:compile", _Listener())

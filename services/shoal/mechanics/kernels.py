@@ -9,7 +9,9 @@ that it has.
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import Any
 
 import numpy as np
@@ -204,7 +206,22 @@ def _kernel(name: str, tile: Tile, *parts: Any) -> Kernel:
     return kernel, (typeof(tile), kind, Reference(room), *own)
 
 
+_planning = ContextVar("planning", default=False)
+
+
+@contextmanager
+def planned() -> Iterator[None]:
+    """Lay out structures whose types alone are needed: addresses of kernels are zero, and none is compiled."""
+    token = _planning.set(True)
+    try:
+        yield
+    finally:
+        _planning.reset(token)
+
+
 def _address(name: str, tile: Tile, *parts: Any) -> int:
+    if _planning.get():
+        return 0
     key = name, len(tile), type(parts[0]), len(getattr(parts[0], "space", ()))
     if key not in _FOUND:
         _FOUND[key] = address(*_kernel(name, tile, *parts))

@@ -137,7 +137,9 @@ def required(scene: Scene, lanes: int, *, every: bool = False) -> list[KernelSig
         name = "leapfrog" if model.flexible else "dop853"
     lane = slice(0, 1)
     arrays = model.tile(tile, lane)
-    room, scheme = work_space(tile, arrays), choose(scene.solver, model, tile, lane, name)
+    room = work_space(tile, arrays)
+    with kernels.planned():
+        scheme = choose(scene.solver, model, tile, lane, name)
     stops = halting(scene.solver, model, name, scene.solver.duration)
     frame = framed(tile, scheme, arrays, room, 0.0, 0, np.zeros(1), model.marker_rows.ravel(), 0.0, stops)
     shared = [
