@@ -12,7 +12,7 @@ from schemathesis.specs.openapi.checks import positive_data_acceptance
 # Right in form is not right in content: a name that is none of the library's is refused.
 EXCLUDED = [positive_data_acceptance]
 REPEATABLE = settings(
-    derandomize=True, deadline=None, suppress_health_check=list(HealthCheck), max_examples=4, database=None
+    derandomize=True, deadline=None, suppress_health_check=list(HealthCheck), max_examples=2, database=None
 )
 
 

@@ -134,6 +134,7 @@ print(hashlib.sha256("".join(content.key(kernel, "") for kernel in kernels).enco
 """
 
 
+@pytest.mark.slow
 def test_all_processes_have_the_same_keys() -> None:
     """The order of a set, as of the options of fast mathematics, is another in each process."""
     environments = [os.environ | {"PYTHONHASHSEED": seed} for seed in ("0", "1")]

@@ -172,7 +172,7 @@ def test_friction_against_the_damped_pendulum_and_its_energy_balance() -> None:
     assert run.energy_drift[0] < 1e-8
 
 
-@pytest.mark.parametrize("friction", [0.0, 0.05])
+@pytest.mark.parametrize("friction", [pytest.param(0.0, marks=pytest.mark.slow), 0.05])
 def test_mixed_tree_keeps_its_energy_and_its_joints(friction: float) -> None:
     run = ENGINE.simulate(_mixed(friction), np.linspace(0, 0.4, 41))
     assert run.ok, run.message
@@ -194,6 +194,7 @@ def test_a_cable_hung_by_its_other_end_moves_the_same() -> None:
     np.testing.assert_allclose(run.marker("B"), ENGINE.simulate(scene, [0.25, 0.5]).marker("B"), atol=1e-10)
 
 
+@pytest.mark.slow
 def test_angles_count_turns_even_between_rare_samples() -> None:
     # Without gravity straight stiff cables turn like one rod: 20 rad/s for 0.5 s.
     turning = {"initial.OA.angle": 0.0, "initial.OA.rate": 20.0, "initial.AB.angle": 0.0, "initial.AB.rate": 20.0}
@@ -240,7 +241,7 @@ def test_a_closed_loop_is_refused_in_one_line() -> None:
         ENGINE.simulate(Scene.parse(data))
 
 
-@pytest.mark.parametrize("solver", ["ipopt", "sqpmethod"])
+@pytest.mark.parametrize("solver", [pytest.param("ipopt", marks=pytest.mark.slow), "sqpmethod"])
 def test_shooting_finds_the_angles_of_the_paper(solver: Any, capfd: pytest.CaptureFixture[str]) -> None:
     scene = _flexible()
     measured = CasadiEngine("rk4").simulate(scene, TIMES).marker("B")

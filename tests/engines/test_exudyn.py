@@ -399,7 +399,8 @@ def test_a_rate_that_jumps_is_refused_and_a_smooth_one_followed():
     assert trajectory.angles[-1, 0, 0] == pytest.approx(0.75, abs=1e-6)
 
 
-@pytest.mark.parametrize(("width", "shorter"), [(1e-2, 1), pytest.param(1e-3, 2, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize(("width", "shorter"), [(1e-2, 1), (1e-3, 2)])
 def test_a_narrow_law_of_a_spring_is_not_leapt_over(width, shorter):
     """A mass passes at 1 m/s through a law that takes 0.2 J from it on its way."""
     law = f"{float(0.2 / width / np.sqrt(np.pi))!r}*exp(-((t - 0.3)/{width!r})**2)"
@@ -426,7 +427,9 @@ def test_a_narrow_law_of_a_spring_is_not_leapt_over(width, shorter):
     assert "narrow part of an elastic law; solver.step needs" in refused.message
 
 
-@pytest.mark.parametrize("engine", [FAST, BEAM], ids=["cable", "beam"])
+@pytest.mark.parametrize(
+    "engine", [pytest.param(FAST, id="cable"), pytest.param(BEAM, id="beam", marks=pytest.mark.slow)]
+)
 def test_a_soft_start_of_a_stiff_rod_follows_the_rigid_closed_form(engine):
     """Rods of any stiffness and mesh whose load grows from zero: I angle'' = F L sin(w t), small angles, no gravity."""
     rng = np.random.default_rng(19)

@@ -123,7 +123,7 @@ TURNED = Scene.parse({
 @pytest.mark.parametrize(
     ("machine", "within"),
     [
-        pytest.param(LOADED, 2e-4, id="loaded"),
+        pytest.param(LOADED, 2e-4, id="loaded", marks=pytest.mark.slow),
         pytest.param(DRIVEN, 1e-4, id="driven"),
         pytest.param(TURNED, 1e-3, id="in-space", marks=pytest.mark.slow),
     ],

@@ -37,7 +37,9 @@ def test_native_solver_agrees_with_casadi(casadi_case: Any, run: Run, native: Ru
     np.testing.assert_allclose(theirs, native(casadi_case), atol=1e-8)
 
 
-@pytest.mark.parametrize("name", ["clamped-tip-mass", "distributed", "torque-on-cable", "two-cables"])
+@pytest.mark.parametrize(
+    "name", ["clamped-tip-mass", pytest.param("distributed", marks=pytest.mark.slow), "torque-on-cable", "two-cables"]
+)
 def test_beams_come_near_the_cables(name: str, cases: Cases, run: Run) -> None:
     """Shear and rotary inertia are left out of a cable: EI / (kGA L^2) is 1e-4 here."""
     pytest.importorskip("exudyn")

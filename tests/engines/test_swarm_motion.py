@@ -174,6 +174,7 @@ def test_at_a_singular_position_a_swarm_minimises_but_does_not_follow_the_motion
         assert abs(angular(solver) / exact - 1) > 1e-2
 
 
+@pytest.mark.slow
 def test_friction_and_drives_enter_the_energy_balance() -> None:
     rubbing = PENDULUM.with_values({"joints.O.friction": 0.4, "initial.OA.rate": 1.0, "initial.AB.rate": -2.0})
     driven = Scene.parse(

@@ -82,6 +82,7 @@ def test_a_server_that_stays_away_is_told_in_one_line(monkeypatch: pytest.Monkey
     assert figures(run.run_flow("identify", STUDY)) == figures(undisturbed)
 
 
+@pytest.mark.slow
 def test_a_server_that_is_not_there_is_told_in_one_line() -> None:
     command = [sys.executable, "-c", "from shoal.cli import main; main()", "run", "identify"]
     environment = {**os.environ, "PREFECT_API_URL": "http://127.0.0.1:9/api"}

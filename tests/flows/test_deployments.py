@@ -97,6 +97,7 @@ def test_what_the_form_does_not_offer_is_for_the_flow_to_refuse() -> None:
     assert strict == {"validation"}
 
 
+@pytest.mark.slow
 def test_forms_offer_the_names_of_the_library(tmp_path: Path) -> None:
     """As they are when the deployments are stated, which `make up` does at its start."""
     scene = (scene_library() / "single-pendulum.yaml").read_text()

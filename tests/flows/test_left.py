@@ -116,6 +116,7 @@ def prefect() -> Iterator[Any]:
         server.stop()
 
 
+@pytest.mark.slow
 def test_a_flow_whose_process_was_killed_is_crashed(prefect: Any) -> None:
     from prefect import flow
     from prefect.states import Running
@@ -134,6 +135,7 @@ def test_a_flow_whose_process_was_killed_is_crashed(prefect: Any) -> None:
     assert not prefect.read_flow_run(scheduled.id).state.is_final()
 
 
+@pytest.mark.slow
 def test_a_run_that_no_process_begins_is_crashed(prefect: Any) -> None:
     """Of this pool alone, after two looks at the same state; not one that a process holds, nor one that waits."""
     from prefect import flow
@@ -164,6 +166,7 @@ def test_a_run_that_no_process_begins_is_crashed(prefect: Any) -> None:
     assert not any(prefect.read_flow_run(run).state.is_final() for run in others)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("prefect")
 def test_a_flow_holds_its_run_until_it_has_ended() -> None:
     from prefect import flow

@@ -113,6 +113,7 @@ def test_whatever_the_end_of_a_study_what_waits_goes_along(
         assert store.connect().get_run(one).info.status == status
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("silent")
 def test_parts_of_a_study_that_was_killed_arrive_without_it(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """They wait for a study that runs; where its process is gone, nothing of it will ever come."""

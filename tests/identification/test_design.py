@@ -86,6 +86,7 @@ def test_the_encoder_of_the_joint_between_two_bodies_is_a_candidate() -> None:
     assert "A" in [row["to"] for row in designed().to_json()["ranked"]]
 
 
+@pytest.mark.slow
 def test_the_recommended_marker_really_scatters_less() -> None:
     found = design(problem(), angle_noise=NOISE, parameter="theta2")
     best, k = found.ranked[0][0], found.aim.names.index("theta2")

@@ -126,6 +126,7 @@ def of_euler(sensor: Sensor) -> Array:
     return bounds(sensor.quantity, place, sensor.tilt or (0.0, 0.0, 0.0))
 
 
+@pytest.mark.slow
 def test_sensors_tell_what_the_fisher_matrix_of_eulers_equations_says(spun: Design) -> None:
     for sensor, found in spun.ranked:
         np.testing.assert_allclose(found.std, of_euler(sensor), rtol=1e-5, err_msg=sensor.label)

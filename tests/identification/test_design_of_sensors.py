@@ -158,6 +158,7 @@ CANTILEVER = {
 }
 
 
+@pytest.mark.slow
 def test_strain_gauges_are_weighed_along_a_rod(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """At rest P (L - s) h / (2 E I) tells E to noise / (strain / E) / sqrt(samples): most at the clamp."""
     (tmp_path / "cantilever.yaml").write_text(yaml.safe_dump(CANTILEVER))

@@ -136,6 +136,7 @@ def test_the_stated_limit_is_what_95_of_100_errors_stay_below(rho: float) -> Non
     np.testing.assert_allclose(np.mean(np.abs(errors) < told.half, axis=0), 0.95, atol=0.01)
 
 
+@pytest.mark.slow
 def test_the_estimate_and_the_command_tell_the_prediction(tmp_path: Path) -> None:
     (path := tmp_path / "held.yaml").write_text(json.dumps(problem().model_dump(mode="json", exclude_none=True)))
     arguments = ["identify", str(path), "--method", "least-squares", "--hold-out", "0.7:1"]

@@ -94,6 +94,7 @@ def test_the_published_swarm_comes_near_and_says_what_it_cost() -> None:
     assert estimate.fitness < 1e-3
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_answer() -> None:
     one, other = (run("paper-case-1", "iafsa-unseeded", seed=3) for _ in range(2))
     assert one.parameters == other.parameters
@@ -127,7 +128,7 @@ def test_one_instant_tells_a_pose_but_not_how_certain_it_is(tmp_path: Path) -> N
     assert 1e-4 < stated.parameters["angle"].std < 1e-2
 
 
-@pytest.mark.parametrize("method", ["auto", "least-squares", "iafsa"])
+@pytest.mark.parametrize("method", ["auto", "least-squares", pytest.param("iafsa", marks=pytest.mark.slow)])
 def test_a_step_that_no_lane_can_take_is_refused_with_its_limit(method: str) -> None:
     with pytest.raises(InputError, match=r"solver\.step: 0\.01 s is beyond the stability limit"):
         run("paper-case-1", method, values={"solver.step": 0.01})
@@ -153,6 +154,7 @@ def test_real_double_pendulum_gives_the_published_ratios() -> None:
     assert len(estimate.combinations) == 2
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not RECORDINGS.is_dir(), reason="the recordings are not here")
 def test_real_single_pendulum() -> None:
     """Authors' numbers give G/J = m a g / (I + m a^2) = 64.2 with their own arm inertia."""

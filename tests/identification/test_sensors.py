@@ -171,7 +171,7 @@ def test_a_load_cell_in_a_pin_shows_what_holds_the_rod(engine: str, accuracy: fl
     np.testing.assert_allclose(found[:, 2], -FRICTION * swing()[1], atol=accuracy)
 
 
-@pytest.mark.parametrize("engine", ["gauss", "exudyn"])
+@pytest.mark.parametrize("engine", ["gauss", pytest.param("exudyn", marks=pytest.mark.slow)])
 def test_the_torque_of_a_drive_is_what_turns_the_rod_as_stated(engine: str) -> None:
     drive = {"kind": "driven-angle", "first": PIN["first"], "second": {"body": "rod"}, "angle": "0.4 + sin(3*t)"}
     driven = pendulum(joints={"O": {"kind": "revolute", **PIN, "friction": FRICTION}, "D": drive}, initial={})
@@ -184,7 +184,7 @@ def test_the_torque_of_a_drive_is_what_turns_the_rod_as_stated(engine: str) -> N
     np.testing.assert_allclose(found[:, 2], centre_force(angle, rate, change)[:, 1], atol=1e-4)
 
 
-@pytest.mark.parametrize("seed", [0, 4, 9])
+@pytest.mark.parametrize("seed", [9, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (0, 4))])
 def test_sensors_of_random_machines_show_what_newton_and_euler_say(seed: int) -> None:
     """A slider-crank, a four-bar linkage and a chain, with friction, springs and motors."""
     drawn = machine(np.random.default_rng(seed))
@@ -291,6 +291,7 @@ ALL = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("stated")
 def test_an_imu_of_another_engine_identifies_the_machine() -> None:
     found = identify(Problem.parse(problem(FELT), "felt"))
@@ -322,6 +323,7 @@ def test_the_command_reads_a_table_of_sensors_in_their_units(stated: Path) -> No
     assert all(one["inside"] for one in answer["prediction"][0]["channels"])
 
 
+@pytest.mark.slow
 def test_the_page_of_an_answer_shows_sensors_without_a_marker(stated: Path) -> None:
     computed = {"kind": "engine", "values": {"bodies.rod.length": 1.4}, "stop": 1.0, "count": 30, "noise": 1e-2}
     text = yaml.safe_dump(problem([ALL[-1], *FELT[:1]], parameters=LENGTH_ALONE, source=computed))

@@ -298,7 +298,8 @@ def check_right_models(kind: str, seeds: range, folder: Path) -> None:
         assert found.hypotheses
 
 
-@pytest.mark.parametrize("kind", ["pendulum", pytest.param("torsion", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["pendulum", "torsion"])
 def test_a_hidden_fault_is_named_or_the_model_is_rejected(kind: str, tmp_path: Path) -> None:
     check_faults(kind, range(10, 11), tmp_path)
 
@@ -349,7 +350,8 @@ def recorded(machine: Machine, times: Array, rng: np.random.Generator, **start: 
     return seen + machine.noise * rng.standard_normal(seen.shape)
 
 
-@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [0, 1])
 def test_a_short_hold_before_the_release_is_named(seed: int, tmp_path: Path) -> None:
     """The parameters follow all of it but a kink: the rate, which is sought, makes up for the delay."""
     rng = np.random.default_rng(seed)
@@ -382,7 +384,9 @@ def test_a_bound_that_excludes_the_truth_is_named_and_nothing_else(tmp_path: Pat
     assert "widen its bounds" in found.advice[0]
 
 
-@pytest.mark.parametrize(("declared", "factor"), [("deg", np.radians(1.0)), ("rad", np.degrees(1.0))])
+@pytest.mark.parametrize(
+    ("declared", "factor"), [("deg", np.radians(1.0)), pytest.param("rad", np.degrees(1.0), marks=pytest.mark.slow)]
+)
 def test_a_wrong_unit_of_angles_is_named_beside_an_offset(declared: str, factor: float, tmp_path: Path) -> None:
     """Of degrees that are taken for radians the reader takes off whole turns."""
     rng = np.random.default_rng(3)
@@ -432,7 +436,7 @@ def springs(folder: Path, bounds: tuple[float, float], times: Array) -> Estimate
     return shoal.identify(Problem.parse(problem, "cart"), data)
 
 
-@pytest.mark.parametrize("bounds", [(5.0, 500.0), (2.0, 300.0)])
+@pytest.mark.parametrize("bounds", [(5.0, 500.0), pytest.param((2.0, 300.0), marks=pytest.mark.slow)])
 def test_a_continuum_is_no_pair_of_machines(bounds: tuple[float, float], tmp_path: Path) -> None:
     """The valley bends so far that from the line between its ends searches slip by a cycle of the motion."""
     found = springs(tmp_path, bounds, np.linspace(0.0, 4.0, 150))

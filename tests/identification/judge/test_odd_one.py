@@ -75,12 +75,14 @@ def test_a_recording_of_noise_is_the_one_to_look_at() -> None:
     assert found.advice[0] == "check recording c"
 
 
+@pytest.mark.slow
 def test_files_that_are_exchanged() -> None:
     found = answer(known=True, a=swing(-0.9), b=swing(-0.4, seed=1), c=swing(-1.2, seed=2))
     assert found.verdict is Verdict.REJECTED
     assert found.suspects[0].name == "files of recordings a and b"
 
 
+@pytest.mark.slow
 def test_two_that_contradict_each_other_and_right_ones() -> None:
     found = answer(a=swing(-0.4), b=0.97 * swing(-0.9, TIMES * 0.99, seed=1))
     assert found.verdict is Verdict.REJECTED

@@ -87,7 +87,7 @@ def as_good(found: Estimate, name: str) -> list[float]:
     return sorted([found.parameters[name].value, *alike])
 
 
-@pytest.mark.parametrize("upper", [110.0, 60.0])
+@pytest.mark.parametrize("upper", [pytest.param(110.0, marks=pytest.mark.slow), 60.0])
 def test_whole_turns_between_samples_are_told_of_a_hinge_in_space(upper: float, tmp_path: Path) -> None:
     """95 - 2 pi 10 = 32.17 rad/s looks alike."""
     spin = {"s": {"path": "initial.w.spin.2", "lower": 0.0, "upper": upper, "start": 30.0}}
@@ -123,7 +123,7 @@ def test_whole_turns_between_samples_are_told_of_a_free_body(tmp_path: Path) -> 
     assert np.min(np.abs(np.array(alike)[:, 2] - 40.0)) < 0.02
 
 
-@pytest.mark.parametrize("axis", [None, Z])
+@pytest.mark.parametrize("axis", [None, pytest.param(Z, marks=pytest.mark.slow)])
 def test_a_misfit_by_too_few_turns_leads_on_to_the_true_ones(axis: Array | None, tmp_path: Path) -> None:
     """A wheel slows down by friction, w = 95 exp(-c t): too slow a one fits, with too much friction, but not well."""
     slowing = 0.002 / 0.02

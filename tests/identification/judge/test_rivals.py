@@ -218,6 +218,7 @@ def test_a_stiffness_that_fits_better_at_another_frequency_is_the_answer(tmp_pat
     assert known.std < 1e-3 * known.value
 
 
+@pytest.mark.slow
 def test_bounds_that_hold_no_alias_leave_a_stiffness_identified(tmp_path: Path) -> None:
     found = identify(oscillator(tmp_path, 30.0, 21.0, 39.0, 28.0, 0.0))
     assert found.verdict is Verdict.IDENTIFIED, found.message

@@ -67,8 +67,8 @@ def test_the_right_model_is_identified(noise: float | None) -> None:
     ("values", "data"),
     [
         ({"bodies.AB.length": 1.8}, {}),
-        ({"gravity.1": -8.0}, {}),
-        ({}, {"friction": 3.0}),
+        pytest.param({"gravity.1": -8.0}, {}, marks=pytest.mark.slow),
+        pytest.param({}, {"friction": 3.0}, marks=pytest.mark.slow),
         ({}, {"clock": 1.26}),
     ],
     ids=["length", "gravity", "friction", "clock"],
@@ -108,7 +108,8 @@ def test_a_noise_that_was_stated_too_small_is_told_and_no_wrong_model() -> None:
     assert judged(1e-3, 4e-3 * draws).verdict is Verdict.REJECTED
 
 
-@pytest.mark.parametrize("noise", [pytest.param(None, marks=pytest.mark.slow), 3e-3])
+@pytest.mark.slow
+@pytest.mark.parametrize("noise", [None, 3e-3])
 def test_correlated_noise_and_digits_are_no_wrong_model(noise: float | None) -> None:
     """AR(1) with a memory of ten samples, as large as stated, on positions rounded to six digits."""
     for seed in range(1 if noise else 4):

@@ -19,7 +19,7 @@ SHOOTING = {"casadi", "casadi-multiple"}
 
 
 def marked(names: Iterable[str]) -> list[object]:
-    return [pytest.param(name, marks=pytest.mark.slow) if name == "afsa" else name for name in names]
+    return [pytest.param(name, marks=pytest.mark.slow) if name in ("afsa", "iafsa-printed") else name for name in names]
 
 
 @cache

@@ -123,7 +123,7 @@ def test_tables_by_hand_are_what_they_say() -> None:
     assert finer_of(Function(table=[(0.0, 0.0), (1.0, 2.0), (2.0, 1.0)])) is None
 
 
-@pytest.mark.parametrize("one_of_many", [False, True])
+@pytest.mark.parametrize("one_of_many", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_a_residual_is_no_less_systematic_for_what_a_drive_might_have_done(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, one_of_many: bool
 ) -> None:

@@ -151,6 +151,7 @@ def test_a_bent_posterior_is_that_of_an_integral_over_a_grid(fall: str) -> None:
         assert np.all(np.abs(told - [lower, median, upper]) < 3 * scatter + 1e-3 * (upper - lower))
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_draws(fall: str) -> None:
     problem, measurement = thrown(fall)
     one, again, other = (sampled(problem, measurement, 300, seed=seed).posterior for seed in (1, 1, 2))

@@ -94,6 +94,7 @@ def test_an_error_that_cancels_on_one_mesh_is_told_on_the_next() -> None:
     assert error <= found.mesh_error <= 2 * error
 
 
+@pytest.mark.slow
 def test_shear_counts_where_it_moves_a_marker_by_more_than_the_tolerance() -> None:
     """The end by Reissner's equations of 1972."""
     scene = cantilever("ancf-cable", solver={"theory": "auto"})

@@ -108,6 +108,7 @@ def test_random_round_rotors_on_random_bearings_whirl_as_their_own_equations_say
     assert named > 20
 
 
+@pytest.mark.slow
 def test_random_rotors_that_are_not_round_on_round_bearings_in_the_turning_frame() -> None:
     """Equations in the turning frame, M x'' + 2 W G x' + (K + W^2 N) x = 0, also where the rotor is unstable."""
     rng = np.random.default_rng(52)
@@ -185,6 +186,7 @@ def test_a_rotor_that_is_not_round_on_bearings_that_are_not_is_refused() -> None
         modes(rotor([0.03, 0.02, 0.025], 50.0, uneven))
 
 
+@pytest.mark.slow
 def test_frequencies_are_those_in_the_motion_by_scipy() -> None:
     """Random discs on a ball, held by springs and gravity: peaks of the spectrum of Newton's and Euler's equations."""
     rng = np.random.default_rng(53)
