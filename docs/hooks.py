@@ -7,6 +7,7 @@ import inspect
 import re
 import textwrap
 from collections.abc import Iterator
+from types import ModuleType
 from typing import Any, Literal, get_args, get_origin
 
 import click
@@ -23,12 +24,24 @@ def on_page_markdown(markdown: str, **_: Any) -> str:
 
 
 def findings() -> str:
-    """The table of all kinds of findings of an identification."""
-    from shoal.findings import Kind
-    from shoal.identification import findings as kinds
+    """Return the tables of all kinds of findings, one for each analysis."""
+    from shoal.identification import findings as identification
+    from shoal.response import findings as response
 
-    rows = ["| code | severity | meaning | verdict | what to do |", "|---|---|---|---|---|"]
-    for one in vars(kinds).values():
+    return "\n\n".join(
+        [
+            f"## Identification\n\n{_kinds(identification, 'verdict')}",
+            f"## Uncertain parameters\n\n{_kinds(response, 'status')}",
+        ]
+    )
+
+
+def _kinds(module: ModuleType, implied: str) -> str:
+    """Return the table of the kinds of a module; implied: what follows from them."""
+    from shoal.findings import Kind
+
+    rows = [f"| code | severity | meaning | {implied} | what to do |", "|---|---|---|---|---|"]
+    for one in vars(module).values():
         if isinstance(one, Kind):
             rows.append(f"| `{one.code}` | {one.severity} | {one.meaning} | {one.implies} | {one.remedy} |")
     return "\n".join(rows)

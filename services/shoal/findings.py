@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any
+from typing import Any, TypeVar
 
 from shoal.trajectory import plain
+
+Order = TypeVar("Order", bound=StrEnum)
 
 
 class Severity(StrEnum):
@@ -18,7 +20,7 @@ class Severity(StrEnum):
     CAUTION = "caution"
     """The answer holds, but a part of it is limited or unknown."""
     REJECTION = "rejection"
-    """There is no answer that can be used."""
+    """The answer cannot be used as it stands."""
 
 
 @dataclass(frozen=True)
@@ -79,3 +81,16 @@ def steps(findings: Iterable[Finding]) -> list[str]:
     all_ = list(findings)
     found = [step for one in all_ for step in one.steps] + [one.kind.remedy for one in all_ if one.kind.remedy]
     return list(dict.fromkeys(found))
+
+
+def worst_implied(findings: Iterable[Finding], order: type[Order]) -> Order:
+    """Return the last member of an ordered enumeration that findings imply; its first where none implies any."""
+    members = list(order)
+    implied = [order(one.kind.implies) for one in findings if one.kind.implies]
+    return max(implied, key=members.index, default=members[0])
+
+
+def sentence(text: str) -> str:
+    """Return a clause with its capital and its full stop; an identifier at its beginning keeps its case."""
+    first, _, rest = text.partition(" ")
+    return f"{first.capitalize() if first.isalpha() and first.islower() else first} {rest}".strip().rstrip(".") + "."

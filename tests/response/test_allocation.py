@@ -301,13 +301,13 @@ def test_a_probability_of_nothing_is_not_near_the_target() -> None:
     """Few runs that none passes leave room for the target, and say nothing of how wide tolerances may be."""
 
     def confirmed(chance: float, unseen: float) -> Confirmed:
-        return Confirmed(np.ones(1), ExceedanceEstimate(np.array([chance]), np.array([0.02]), "", unseen), "")
+        return Confirmed(np.ones(1), ExceedanceEstimate(np.array([chance]), np.array([0.02]), "", unseen), [])
 
     assert confirmed(9.8e-3, 0.0).near(1e-2)
     assert not confirmed(1.01e-2, 0.0).near(1e-2)
     assert not confirmed(0.0, 0.1).near(1e-2)
-    assert "wider ones may do" in confirmed(0.0, 0.1).message(1e-2, np.full(1, 3.0))
-    assert not confirmed(0.0, 0.1).message(1e-2, np.ones(1))
+    assert [one.code for one in confirmed(0.0, 0.1).findings(1e-2, np.full(1, 3.0))] == ["allocation-too-tight"]
+    assert not confirmed(0.0, 0.1).findings(1e-2, np.ones(1))
 
 
 def test_what_cannot_be_allocated_is_refused() -> None:

@@ -63,7 +63,7 @@ def test_more_design_points_than_are_found_are_a_doubt() -> None:
     function, exact = cube(4.0, 8)
     for seed in range(6):
         found = probability(margins(function, 8), "auto", seed)
-        assert found.doubt or exact <= found.estimate.interval[1][-1], seed
+        assert found.findings or exact <= found.estimate.interval[1][-1], seed
 
 
 @pytest.mark.parametrize("way", ["auto", "importance"])
@@ -73,7 +73,7 @@ def test_a_design_point_around_which_no_run_passes_is_a_doubt(way: str) -> None:
     found = probability(run, way, 0)
     assert found.estimate.probability == 0
     assert found.estimate.told.startswith("below 0.00")
-    assert "none of" in found.doubt
+    assert "none-exceeds-at-design-point" in [one.code for one in found.findings]
 
 
 def test_runs_drawn_all_around_are_those_that_lie_there() -> None:

@@ -67,7 +67,7 @@ def test_a_refused_run_at_the_design_point_is_a_doubt_and_costs_no_answer(
     monkeypatch.setattr(importlib.import_module("shoal.response.limits.judge"), "show", refused)
     found = uncertain(SCENE, {UP: known}, [0.5], limit=["P.y > 1.3"], limit_runs=300)
     assert not found.ok
-    assert "cannot be assembled" in found.message
+    assert "limit-run-rejected" in found.codes
     (told,) = found.to_json()["limits"]
     assert told["shown_by"]["status"] == "refused"
     assert told["shown_by"]["margin"] is None
@@ -76,7 +76,7 @@ def test_a_refused_run_at_the_design_point_is_a_doubt_and_costs_no_answer(
 
 def test_a_wrong_cost_is_refused_before_the_study(monkeypatch: pytest.MonkeyPatch) -> None:
     module = importlib.import_module("shoal.response.uncertain")
-    monkeypatch.setattr(module, "respond", lambda *_, **__: pytest.fail("the study was made"))
+    monkeypatch.setattr(module, "respond_markers", lambda *_, **__: pytest.fail("the study was made"))
     with pytest.raises(InputError, match="cost"):
         uncertain(SCENE, {UP: (4.7, 5.3)}, limit=["P.y > 1.3"], allocate=True, cost={"initial.P.vel": 2.0})
 

@@ -102,7 +102,7 @@ def test_the_convolution_of_many_variables_by_importance_sampling() -> None:
 def test_a_sum_of_heavy_tails(seed: int) -> None:
     of, exact = drawn(seed, 10)
     found = of.asked(seed)
-    assert not found.doubt
+    assert not found.findings
     lower, upper = (float(end[-1]) for end in found.estimate.interval)
     assert lower <= exact <= upper
     assert found.estimate.probability == pytest.approx(exact, rel=0.1)
@@ -116,7 +116,7 @@ def test_intervals_of_sums_hold_as_often_as_they_say() -> None:
         of, exact = drawn(100 + seed)
         found = of.asked(seed)
         lower, upper = (float(end[-1]) for end in found.estimate.interval)
-        doubted += bool(found.doubt)
-        held += not found.doubt and lower <= exact <= upper
+        doubted += bool(found.findings)
+        held += not found.findings and lower <= exact <= upper
     assert held >= 0.93 * (120 - doubted)
     assert doubted <= 12

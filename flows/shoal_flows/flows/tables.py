@@ -63,7 +63,7 @@ def of_response(found: Response) -> str:
             ends.setdefault(f"{name.partition('.')[0]}.{of}", {})[told] = value
     shown = table(("at the end", *next(iter(ends.values()))), ((of, *told.values()) for of, told in ends.items()))
     evidence = f"{found.status}, {found.errors.brief}; {found.evaluations} runs; {found.why}"
-    said = [evidence, found.message, found.mixes_starts]
+    said = [evidence, *(one.text for one in found.findings)]
     for one in found.limits:
         event = one.limit.event
         kept = f"{one.limit.verdict(one.kept)}{f' {looked_at(one.times)}' if one.kept else ''}"

@@ -20,7 +20,7 @@ POINTS = 300
 def log_response(study: str, found: Response, album: Mapping[str, bytes]) -> str:
     """One run; album: artifacts by path. Returns its id."""
     scene = found.stated
-    tags = {"kind": "uncertain", "scene": scene.name}
+    tags = {"kind": "uncertain", "scene": scene.name, "findings": ", ".join(found.codes)}
     with open_run("Uncertain", f"{study} · uncertain", description=scene.description, tags=tags) as run:
         run.judge(*verdict(found))
         known = {f"vary.{one.name}": one.marginal.text for one in found.inputs.parameters}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from enum import StrEnum
 
-from shoal.findings import Finding, Kind, Severity
+from shoal.findings import Finding, Kind, Severity, worst_implied
 
 _ALLOW = "allow more time"
 _ANOTHER = "look for another minimum (--method multi-start)"
@@ -30,9 +30,7 @@ class Verdict(StrEnum):
 
 def verdict_of(findings: Iterable[Finding]) -> Verdict:
     """Return the worst verdict that findings imply; identified where none implies any."""
-    order = list(Verdict)
-    implied = [Verdict(one.kind.implies) for one in findings if one.kind.implies]
-    return max(implied, key=order.index, default=Verdict.IDENTIFIED)
+    return worst_implied(findings, Verdict)
 
 
 def _rejects(code: str, verdict: Verdict, meaning: str, remedy: str = "") -> Kind:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from shoal.findings import sentence
 from shoal.identification import Estimate
 from shoal.identification.spread.value import Value
 from shoal.pictures import units
@@ -43,7 +44,7 @@ def findings(
         "answer_title": "The answer" if estimate.verdict.trusted else "Numbers that are no answer",
         "headings": ["parameter", "value", "standard deviation (noise)", "95 % interval", "known", *truth],
         "rows": _rows(answer),
-        "reasons": [_sentence(one.text) for one in estimate.findings],
+        "reasons": [sentence(one.text) for one in estimate.findings],
         "remarks": _remarks(estimate),
         "motions": [animation(one, _machine(answer, one)) for one in moving],
         "pictures": [one.embedded() for one in drawn],
@@ -96,7 +97,7 @@ def _rows(answer: Answer) -> list[list[str]]:
 
 def _remarks(estimate: Estimate) -> list[str]:
     tests = (f"Residuals, {sentence}." for sentence in estimate.residual_tests.sentences())
-    sentences = (_sentence(text) for text in (*estimate.combinations, *estimate.notes))
+    sentences = (sentence(text) for text in (*estimate.combinations, *estimate.notes))
     remarks = [*(f"Next: {step}." for step in estimate.advice), *sentences, *tests]
     if estimate.model_error_rms is not None:
         error = length(estimate.model_error_rms)
@@ -134,9 +135,3 @@ def _remarks(estimate: Estimate) -> list[str]:
 def _machine(answer: Answer, one: DrawnMotion) -> str:
     machine = "identified machine" if answer.estimate.verdict.trusted else "fitted machine"
     return f"Recording {one.name}: the {machine}" if len(answer.estimate.scenes) > 1 else f"The {machine}"
-
-
-def _sentence(text: str) -> str:
-    """A clause with its capital and its full stop; an identifier at its beginning keeps its case."""
-    first, _, rest = text.partition(" ")
-    return f"{first.capitalize() if first.isalpha() and first.islower() else first} {rest}".strip().rstrip(".") + "."

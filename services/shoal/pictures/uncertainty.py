@@ -9,6 +9,7 @@ import numpy as np
 
 from shoal.engines import get_engine
 from shoal.errors import ComputationError, InputError
+from shoal.findings import sentence
 from shoal.pictures.drawn import Drawn
 from shoal.pictures.estimates import budget
 from shoal.pictures.gaps import gaps
@@ -45,6 +46,8 @@ def uncertainty(found: Response) -> str:
         passages=[_passage(one).embedded() for one in found.limits if one.estimates],
         allocation=_allocation(found),
         allocated=_allocated(found),
+        reasons=[sentence(one.text) for one in found.findings],
+        advice=[sentence(one) for one in found.advice],
         remarks=_remarks(found),
         provenance=_provenance(found),
     )
@@ -52,7 +55,7 @@ def uncertainty(found: Response) -> str:
 
 def _lead(found: Response) -> str:
     if not found.ok:
-        return f"Not to be believed as it stands ({found.status}): {found.message}."
+        return f"Not to be believed as it stands ({found.status}): {found.findings[0].text}."
     told = found.bounds.upper - found.bounds.lower if found.bounds is not None else None
     if told is not None:
         widest, marker = _largest(found, told)
@@ -183,9 +186,7 @@ def _allocated(found: Response) -> list[str]:
 
 
 def _remarks(found: Response) -> list[str]:
-    remarks = [f"{found.mixes_starts}."] if found.mixes_starts else []
-    remarks += [f"{one.limit.title}: {one.passing.why}." for one in found.limits if one.passing is not None]
-    remarks += [f"{one.limit.title}: {one.note}." for one in found.limits if one.note]
+    remarks = [f"{one.limit.title}: {one.passing.why}." for one in found.limits if one.passing is not None]
     for one in found.limits:
         if one.between is not None:
             for side, at in (("least", one.between.at_lower), ("most", one.between.at_upper)):

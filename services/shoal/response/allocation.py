@@ -17,6 +17,8 @@ import numpy as np
 from scipy import optimize
 
 from shoal.errors import ComputationError, InputError
+from shoal.findings import Finding, message
+from shoal.response import findings as kinds
 from shoal.response.inputs import Inputs, UncertainParameter
 from shoal.response.marginals import scaled
 from shoal.response.runs import CachedModel, Model
@@ -54,7 +56,7 @@ class Allocation:
     factors: on those that are stated, (parameters,); effects: of tightening each by one per cent: by how much the least
     margin grows, or by which share the probability falls, (parameters,); confirmed: the least margin, or the
     probability (the largest over intervals), with the new ones; target: what it had to be; cost: of the new ones over
-    that of the stated ones; interval: in which that probability lies with 95 % confidence
+    that of the stated ones; findings: why it is no answer; interval: 95 % confidence interval of that probability
     """
 
     required: str
@@ -66,13 +68,13 @@ class Allocation:
     target: float
     cost: float
     evaluations: int
-    message: str
+    findings: list[Finding]
     interval: tuple[float, float] | None = None
 
     @property
     def ok(self) -> bool:
         """Return whether a confirming study keeps the limit."""
-        return not self.message
+        return not self.findings
 
     @property
     def allocated(self) -> Inputs:
@@ -107,7 +109,7 @@ class Allocation:
                 {
                     "require": self.required,
                     "status": "ok" if self.ok else "not-met",
-                    "message": self.message,
+                    "message": message(self.findings),
                     f"{told}_stated": self.stated,
                     f"{told}_allocated": self.confirmed,
                     f"{told}_interval": self.interval,
@@ -171,7 +173,7 @@ def of_intervals(text: str, model: Model, inputs: Inputs, least: Least, costs: A
 
     model: margins over time. Raises ComputationError if the middle values pass it.
     """
-    factors, evaluations, message = np.ones(len(inputs)), 0, ""
+    factors, evaluations = np.ones(len(inputs)), 0
     stated, effects = math.nan, np.zeros(len(inputs))
     cuts: dict[tuple[float, ...], tuple[Array, float]] = {}
     for round_ in range(ROUNDS):
@@ -192,10 +194,10 @@ def of_intervals(text: str, model: Model, inputs: Inputs, least: Least, costs: A
         if settled:
             break
     confirmed, factors, more = _shrunk(factors, lambda s: _outer(least, with_factors(inputs, s)))
-    if confirmed < 0:
-        message = "no tolerances were found that keep the limit"
+    why = "no tolerances were found that keep the limit"
+    found = [kinds.NOT_MET.found(why, margin=confirmed)] if confirmed < 0 else []
     cost = float(costs @ (1 / factors) / costs.sum())
-    return Allocation(text, inputs, factors, effects, stated, confirmed, 0.0, cost, evaluations + more, message)
+    return Allocation(text, inputs, factors, effects, stated, confirmed, 0.0, cost, evaluations + more, found)
 
 
 def _within(cuts: list[tuple[Array, float]], costs: Array, most: Array) -> Array:

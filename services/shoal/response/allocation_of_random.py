@@ -25,6 +25,8 @@ import numpy as np
 from scipy import optimize, special
 
 from shoal.errors import ComputationError
+from shoal.findings import Finding, message
+from shoal.response import findings as kinds
 from shoal.response.allocation import MANY, ROUNDS, SETTLED, STEP, TIGHTEST, Allocation, passed, with_factors
 from shoal.response.between import GAP, MORE, PLACES, between
 from shoal.response.inputs import Inputs
@@ -131,11 +133,11 @@ class Deciding:
 
 @dataclass(frozen=True)
 class Confirmed:
-    """What a study tells with these factors. doubt: why it should not be believed, empty if it may be."""
+    """Probability with these factors. reasons: for doubt about it."""
 
     factors: Array
     estimate: ExceedanceEstimate
-    doubt: str
+    reasons: list[Finding]
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -152,14 +154,15 @@ class Confirmed:
         """Return whether the probability is not above the target."""
         return self.estimate.probability <= target
 
-    def message(self, target: float, widest: Array) -> str:
-        """What speaks against the answer."""
-        chance, told = self.estimate.probability, "with the tolerances that were found"
+    def findings(self, target: float, widest: Array) -> list[Finding]:
+        """Return reasons against the answer."""
+        chance = self.estimate.probability
+        text, numbers = f"the probability is {chance:.2e} with the tolerances that were found", {"probability": chance}
         if not self.kept(target):
-            return f"the probability is {chance:.2e} {told}"
+            return [kinds.NOT_MET.found(text, **numbers)]
         if chance < OFF * target and not self.near(target) and np.any(self.factors < widest):
-            return f"the probability is {chance:.2e} {told}, of {target:g} that are allowed: wider ones may do"
-        return self.doubt
+            return [kinds.TIGHT.found(f"{text}, of {target:g} that are allowed: wider ones may do", **numbers)]
+        return [kinds.UNCONFIRMED.found(message(self.reasons), **numbers)] if self.reasons else []
 
 
 def of_random(
@@ -229,7 +232,7 @@ def of_random(
         target=target,
         cost=float(costs @ (1 / best.factors) / costs.sum()),
         evaluations=spent,
-        message=best.message(target, widest),
+        findings=best.findings(target, widest),
         interval=best.interval,
     )
 
@@ -304,10 +307,10 @@ def _confirmed(
     if not inputs.mixed:
         margins = Margins(watched(machine, limit), here, MOST)
         passing = probability(margins, "auto", how["seed"])
-        return Confirmed(factors, passing.estimate, passing.doubt), margins.evaluations
+        return Confirmed(factors, passing.estimate, passing.findings), margins.evaluations
     found = between(limit, machine, here, **{**how, "verify": False, "progress": None})
     assert found.between is not None
     largest = found.between.upper
     # The index has no bound where a limit cannot be passed, and no polynomial follows it there; the margin has.
-    doubt = largest.reason_to_doubt or undecided(min(found.between.beyond[1], beyond))
-    return Confirmed(factors, largest.estimates[0], doubt), found.evaluations
+    reasons = [*largest.reasons, *undecided(min(found.between.beyond[1], beyond))]
+    return Confirmed(factors, largest.estimates[0], reasons), found.evaluations

@@ -6,8 +6,10 @@ the study may be off by, whatever its own method says: outer bounds and errors o
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,6 +17,8 @@ from shoal.engines.deviation import by_source
 from shoal.engines.sources import WRONG
 from shoal.engines.verification import Verification, run_verified
 from shoal.error_budget import ErrorBudget, worst
+from shoal.findings import Finding
+from shoal.response import findings as kinds
 from shoal.response.boxes import Boxes, Ends
 from shoal.response.machine import ResponseModel, stable
 from shoal.response.result import Bounds
@@ -22,6 +26,12 @@ from shoal.response.runs import CachedModel
 from shoal.response.statistics import Statistics
 from shoal.trajectory import Array
 
+if TYPE_CHECKING:
+    from shoal.response.problem import UncertainProblem
+    from shoal.response.respond import ModelResponse
+
+CHECKED = 6
+"""Extremal runs, or drawn ones, that are repeated more carefully."""
 NEGLIGIBLE = 0.01
 """An error below this share of what the runs differ by rejects none of them."""
 
@@ -29,12 +39,21 @@ NEGLIGIBLE = 0.01
 @dataclass(frozen=True, eq=False)
 class ModelErrors:
     """budget: of the markers, the largest of the runs that were looked at; columns: of every column, all sources
-    together, (columns,); rejected: why a more careful run does not bear one out
+    together, (columns,); findings: that a more careful run rejects the model
     """
 
     budget: ErrorBudget
     columns: Array
-    rejected: str = ""
+    findings: list[Finding] = field(default_factory=list)
+
+    def widened(self, found: ModelResponse) -> ModelResponse:
+        """Return a response whose outer bounds and errors of statistics allow for the model."""
+        return replace(
+            found,
+            bounds=None if found.bounds is None else self.of_bounds(found.bounds),
+            statistics=None if found.statistics is None else self.of_statistics(found.statistics),
+            boxes=None if found.boxes is None else self.of_boxes(found.boxes),
+        )
 
     def of_bounds(self, found: Bounds) -> Bounds:
         """Bounds whose outer ones allow for the model."""
@@ -62,6 +81,23 @@ class ModelErrors:
         return replace(found, lower_outer=found.lower_outer - off, upper_outer=found.upper_outer + off)
 
 
+def known_errors(problem: UncertainProblem, found: ModelResponse) -> ModelErrors:
+    """Return the errors of decisive runs, where they are asked for and there is time. Raises InputError."""
+    if not problem.careful:
+        return unestimated(problem.model)
+    return model_errors(problem.model, found.runs, _decisive(found, problem.asked.seed))
+
+
+def _decisive(found: ModelResponse, seed: int) -> list[int]:
+    """Return the numbers of the runs that attain most bounds, or of some that were drawn."""
+    runs = found.runs
+    if found.bounds is None:
+        drawn = np.random.default_rng(seed).choice(len(runs.germs), min(CHECKED, len(runs.germs)), False)
+        return list(drawn.tolist())
+    used = Counter([*runs.values.argmin(axis=0).tolist(), *runs.values.argmax(axis=0).tolist()])
+    return [run for run, _ in used.most_common(CHECKED)]
+
+
 def unestimated(machine: ResponseModel) -> ModelErrors:
     """None are known."""
     return ModelErrors(ErrorBudget(), np.zeros(int(np.prod(machine.columns))))
@@ -79,8 +115,8 @@ def model_errors(machine: ResponseModel, runs: CachedModel, chosen: Sequence[int
             columns = np.maximum(found.columns, _columns(verification, len(found.columns)))
             found = ModelErrors(worst([found.budget, verification.errors]), columns)
         if not careful.ok and not (nothing := _nothing(machine, runs.values))(verification):
-            why = f"a more careful run does not bear one out: {careful.message}{nothing}"
-            return replace(found, rejected=why)
+            text = f"a more careful run rejects one: {careful.message}{nothing}"
+            return replace(found, findings=[kinds.MODEL_REJECTED.found(text)])
     return found
 
 

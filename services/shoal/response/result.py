@@ -11,9 +11,11 @@ import numpy as np
 from shoal.engines.starts import Elsewhere
 from shoal.error_budget import GOOD, ErrorBudget, Grade
 from shoal.errors import InputError
+from shoal.findings import Finding, message, steps
 from shoal.response.allocation import Allocation
 from shoal.response.boxes import Boxes
 from shoal.response.control import unseen
+from shoal.response.findings import ResponseStatus, status_of
 from shoal.response.finer import Finer
 from shoal.response.inputs import Inputs
 from shoal.response.limits import Judged
@@ -56,8 +58,8 @@ class Bounds:
 class Response:
     """How the markers of a scene may move.
 
-    status: ok, gap-not-reached, beyond-horizon, deviation-in-doubt, failed-runs or model-rejected; message: why it is
-    not ok; why: what the method did; times: instants [s]; markers: names; horizon: up to when bounds hold [s]; bounds:
+    findings: about the answer, the decisive first; why: what the method did; times: instants [s]; markers: names;
+    horizon: up to when bounds hold [s]; bounds:
     None if a parameter is random; statistics: None unless all are; boxes: bounds of the statistics, if only some are;
     columns are (instants, markers, quantities) in this order;
     errors: of the markers in extremal runs [m], empty where not estimated; model: the same of every column, by which
@@ -68,8 +70,7 @@ class Response:
     of the runs, those for limits among them, start elsewhere than the scene states
     """
 
-    status: str
-    message: str
+    findings: list[Finding]
     scene: str
     method: str
     why: str
@@ -97,9 +98,24 @@ class Response:
     elsewhere: Elsewhere | None = None
 
     @property
-    def mixes_starts(self) -> str:
-        """That some runs start elsewhere than stated, in words; empty if none does."""
-        return "" if self.elsewhere is None else self.elsewhere.describe()
+    def status(self) -> ResponseStatus:
+        """The worst status that the findings imply."""
+        return status_of(self.findings)
+
+    @property
+    def codes(self) -> list[str]:
+        """The codes of the findings, in their order."""
+        return [one.code for one in self.findings]
+
+    @property
+    def message(self) -> str:
+        """The findings in one line."""
+        return message(self.findings)
+
+    @property
+    def advice(self) -> list[str]:
+        """Steps to take next."""
+        return steps(self.findings)
 
     @property
     def mesh_error(self) -> float | None:
@@ -130,7 +146,7 @@ class Response:
     @property
     def ok(self) -> bool:
         """Return whether the answer can be believed as it stands."""
-        return self.status == "ok"
+        return self.status is ResponseStatus.OK
 
     @property
     def unseen(self) -> float | None:
@@ -268,7 +284,7 @@ class Response:
                     put(f"{index}_lower", sides[0], "random")
                     put(f"{index}_upper", sides[1], "random")
         about = {"scene": self.scene, "status": self.status, "method": self.method, "why": self.why}
-        about |= {"starts": self.mixes_starts} if self.mixes_starts else {}
+        about |= {"findings": ", ".join(self.codes)}
         numbers = {"horizon": self.horizon, "evaluations": self.evaluations, "seed": self.seed}
         if self.unseen is not None:
             numbers["unseen"] = self.unseen
@@ -278,7 +294,9 @@ class Response:
         """The object that `shoal uncertain --json` prints."""
         return {
             "status": self.status,
-            "message": "; ".join(filter(None, (self.message, self.mixes_starts))),
+            "message": self.message,
+            "advice": self.advice,
+            "findings": [one.to_json() for one in self.findings],
             "scene": self.scene,
             "method": self.method,
             "why": self.why,

@@ -149,6 +149,6 @@ def repeated(state: str, way: str, times: int) -> Repeated:
         estimate = found.estimate
         lower, upper = estimate.interval
         held, most = held + int(lower[-1] <= exact <= upper[-1]), max(most, run.evaluations)
-        doubted += int(bool(found.doubt))
+        doubted += int(bool(found.findings))
         ratios.append(estimate.probability / exact)
     return Repeated(held / times, doubted / times, np.array(ratios), most)

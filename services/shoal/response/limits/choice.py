@@ -5,13 +5,15 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from shoal.errors import InputError
+from shoal.findings import Finding
+from shoal.response import findings as kinds
 from shoal.response.kept import TimeIsUpError
-from shoal.response.limits.counted import contradiction
+from shoal.response.limits.counted import contradictions
 from shoal.response.limits.estimate import ExceedanceEstimate
 from shoal.response.limits.form import APART, SHARES, DesignPoint, design_points, distinct
 from shoal.response.limits.importance import Sample, adapted, controlled, sample
@@ -64,15 +66,15 @@ DISAGREE = 4.0
 
 @dataclass(frozen=True)
 class Passing:
-    """The answer of a method. doubt: why it should not be believed, empty if it may be; plain: runs that were drawn
-    from the distributions to see whether they contradict it; sample: runs by which it can be counted how probable the
+    """The answer of a method. findings: why it is in doubt; plain: runs that were drawn from the distributions to see
+    whether they contradict it; sample: runs by which it can be counted how probable the
     limit would be if it were elsewhere, None where there are none
     """
 
     estimate: ExceedanceEstimate
     points: list[DesignPoint]
     why: str
-    doubt: str = ""
+    findings: list[Finding] = field(default_factory=list)
     plain: int = 0
     sample: Sample | None = None
 
@@ -91,22 +93,24 @@ def form(margins: Margins, seed: int) -> Passing:
     directions *= 3 / np.linalg.norm(directions, axis=1)[:, None]
     points = design_points(margins, np.vstack([np.zeros((1, parameters)), directions]))
     if not points:
-        return Passing(_nothing("no design point"), [], "FORM", "FORM found no place where the limit is passed")
+        none = kinds.NO_DESIGN_POINT.found("FORM found no place where the limit is exceeded")
+        return Passing(_nothing("no design point"), [], "FORM", [none])
     instants = margins(np.zeros((1, parameters))).shape[1]
     passed = np.where(np.arange(instants) >= points[0].instant, points[0].probability, 0.0)
-    doubt = "" if points[0].converged else "FORM did not converge"
-    if not doubt and len(points) > 1:
-        doubt = f"{len(points)} design points were found and FORM takes the nearest only"
-    return Passing(
-        ExceedanceEstimate(passed, np.full(instants, np.nan), "FORM"), points, "FORM: first-order estimate", doubt
-    )
+    found = [] if points[0].converged else [kinds.FORM_NOT_CONVERGED.found("FORM did not converge")]
+    if len(points) > 1:
+        text = f"{len(points)} design points were found and FORM takes the nearest only"
+        found.append(kinds.SEVERAL_DESIGN_POINTS.found(text, points=len(points)))
+    estimate = ExceedanceEstimate(passed, np.full(instants, np.nan), "FORM")
+    return Passing(estimate, points, "FORM: first-order estimate", found)
 
 
 def by_importance(margins: Margins, seed: int) -> Passing:
     """Runs around the design points that FORM finds."""
     points = form(margins, seed).points
     if not points:
-        return Passing(_nothing("no design point"), [], "importance sampling", "no design point was found to sample at")
+        none = kinds.NO_DESIGN_POINT.found("no design point was found to sample at")
+        return Passing(_nothing("no design point"), [], "importance sampling", [none])
     found = sample(margins, adapted(points, []), margins.left, seed + 1)
     why = f"{found.estimate.why} around {_told(points)}"
     return Passing(found.estimate, points, why, _weak(found.estimate, [found], points, ended=True), sample=found)
@@ -148,7 +152,7 @@ def auto(margins: Margins, seed: int) -> Passing:
     rows = margins(plain)
     searched = _search(margins, pilot, [], seed + 10)
     if not searched.points:
-        return Passing(rough, [], rough.why, contradiction(rough, rows), len(rows), pilot.sample)
+        return Passing(rough, [], rough.why, contradictions(rough, rows), len(rows), pilot.sample)
     first = sample(margins, adapted(searched.proposed, searched.beyond), int(FIRST * margins.left), seed + 2)
     searched = _search(margins, pilot, searched.points, seed + 20)
     proposal = adapted(searched.proposed, [*searched.beyond, first], first)
@@ -157,14 +161,14 @@ def auto(margins: Margins, seed: int) -> Passing:
     if searched.surface is not None:
         estimate = controlled(last, proposal, searched.surface.chances, seed + 5)
     # Subset simulation may lose a place as well, but it finds none that is not there.
-    doubt = (
-        contradiction(estimate, rows)
-        or _weak(estimate, [last, first], searched.points, ended=searched.ended)
-        or _disagree(estimate, "importance sampling", first.estimate, 0.0, "its first runs", both=True)
-        or _disagree(estimate, "importance sampling", rough, LEAST, "subset simulation")
-    )
+    findings = [
+        *contradictions(estimate, rows),
+        *_weak(estimate, [last, first], searched.points, ended=searched.ended),
+        *_disagree(estimate, "importance sampling", first.estimate, 0.0, "its first runs", both=True),
+        *_disagree(estimate, "importance sampling", rough, LEAST, "subset simulation"),
+    ]
     why = f"{estimate.why} around {_told(searched.points)}; {rough.why} says {rough.probability:.1e}"
-    return Passing(estimate, searched.points, why, doubt, len(rows), last)
+    return Passing(estimate, searched.points, why, findings, len(rows), last)
 
 
 @dataclass(frozen=True)
@@ -298,41 +302,44 @@ def _told(points: list[DesignPoint]) -> str:
     return f"{what} (beta {betas})"
 
 
-def _weak(estimate: ExceedanceEstimate, samples: list[Sample], points: list[DesignPoint], *, ended: bool) -> str:
-    """Empty, or why runs around design points do not tell the probability. ended: whether the search for these did."""
-    sure = [point for point in points if point.converged]
+def _weak(
+    estimate: ExceedanceEstimate, samples: list[Sample], points: list[DesignPoint], *, ended: bool
+) -> list[Finding]:
+    """Return why runs around design points do not give the probability. ended: whether the search for these did."""
+    sure, runs = [point for point in points if point.converged], len(samples[0].rows)
     if not estimate.probability and sure:
-        return f"there is {_told(sure)}, but none of {len(samples[0].rows)} runs around it passes the limit"
-    seen = 0
+        text = f"there is {_told(sure)}, but none of {runs} runs around it exceeds the limit"
+        return [kinds.NONE_EXCEEDS.found(text, runs=runs)]
+    found, seen = list[Finding](), 0
     for rows, probability in itertools.chain.from_iterable(one.outside for one in samples):
-        if doubt := contradiction(estimate, rows, outside=probability):
-            return doubt
+        found += contradictions(estimate, rows, outside=probability)
         seen += int((rows < 0).any(axis=1).sum())
     if not ended and len(points) >= SEVERAL and seen < SEEN:
-        return f"there may be more design points than the {len(points)} that were found"
-    return _coarse(estimate)
+        text = f"there may be more design points than the {len(points)} that were found"
+        found.append(kinds.DESIGN_POINTS_MISSED.found(text, points=len(points)))
+    return [*found, *_coarse(estimate)]
 
 
 def _disagree(
     one: ExceedanceEstimate, name: str, other: ExceedanceEstimate, least: float, told: str, *, both: bool = False
-) -> str:
-    """Return that an independent estimate is larger (or, for `both`, smaller) than chance allows, else "".
+) -> list[Finding]:
+    """Return a finding where an independent estimate is larger (or, for `both`, smaller) than chance allows.
 
     least: coefficient of variation of the other at least; told: what it is
     """
     if not other.probability:
-        return ""
+        return []
     chance = DISAGREE * math.hypot(max(other.coefficient, least), one.coefficient) if one.probability else 0.0
     away = math.log(other.probability / one.probability) if one.probability else math.inf
     if away <= chance and not (both and -away > chance):
-        return ""
-    return f"{name} says {one.probability:.1e} and {told} {other.probability:.1e}"
+        return []
+    text = f"{name} says {one.probability:.1e} and {told} {other.probability:.1e}"
+    return [kinds.ESTIMATES_DIFFER.found(text, probability=one.probability, other=other.probability)]
 
 
-def _coarse(estimate: ExceedanceEstimate) -> str:
-    """Empty, or how coarse the estimate is."""
-    if not estimate.probability:
-        return ""
-    if estimate.coefficient <= COARSE:
-        return ""
-    return f"the coefficient of variation of the probability is {estimate.coefficient:.2f}"
+def _coarse(estimate: ExceedanceEstimate) -> list[Finding]:
+    """Return a finding where the coefficient of variation is large."""
+    if not estimate.probability or estimate.coefficient <= COARSE:
+        return []
+    text = f"the coefficient of variation of the probability is {estimate.coefficient:.2f}"
+    return [kinds.COARSE.found(text, coefficient=estimate.coefficient)]

@@ -7,6 +7,8 @@ import math
 import numpy as np
 from scipy import stats
 
+from shoal.findings import Finding
+from shoal.response import findings as kinds
 from shoal.response.limits.estimate import ExceedanceEstimate
 from shoal.trajectory import Array
 
@@ -16,23 +18,27 @@ ROUGH = 2.0
 """A probability without an interval may be off by this factor."""
 
 
-def contradiction(estimate: ExceedanceEstimate, margins: Array, share: float = 1.0, outside: float = 1.0) -> str:
-    """In words, empty where the number of runs that pass is a likely one (binomial tests of both ends, one-sided).
+def contradictions(
+    estimate: ExceedanceEstimate, margins: Array, share: float = 1.0, outside: float = 1.0
+) -> list[Finding]:
+    """Return a finding where the number of runs beyond the limit is unlikely (binomial tests of both ends, one-sided).
 
     margins: of runs drawn from the distributions, (runs, instants); share: of them that counts as independent;
     outside: probability of that part of the distributions which they are drawn from: what passes may lie elsewhere, so
     that few say nothing
     """
     lower, upper = ends(estimate)
-    passed, made = int(np.any(margins < 0, axis=1).sum()), len(margins)
+    exceeding, made = int(np.any(margins < 0, axis=1).sum()), len(margins)
     count = int(share * made)
-    few = stats.binom.cdf(math.ceil(share * passed), count, lower) if outside == 1 else 1.0
-    many = stats.binom.sf(math.floor(share * passed) - 1, count, min(upper / outside, 1.0))
+    few = stats.binom.cdf(math.ceil(share * exceeding), count, lower) if outside == 1 else 1.0
+    many = stats.binom.sf(math.floor(share * exceeding) - 1, count, min(upper / outside, 1.0))
     if min(few, many) >= CHANCE:
-        return ""
+        return []
     said = f"{estimate.why} says {estimate.probability:.1e}"
     runs = "plain runs" if outside == 1 else f"runs from the outer {outside:.1e} of the distributions"
-    return f"{said}, but of {made} {runs} {passed} pass it, which makes {outside * passed / made:.1e}"
+    counted = outside * exceeding / made
+    text = f"{said}, but of {made} {runs} {exceeding} exceed it, which makes {counted:.1e}"
+    return [kinds.CONTRADICTED.found(text, probability=estimate.probability, counted=counted, runs=made)]
 
 
 def ends(estimate: ExceedanceEstimate) -> tuple[float, float]:

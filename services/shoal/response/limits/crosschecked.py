@@ -10,8 +10,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from shoal.findings import Finding
+from shoal.response import findings as kinds
 from shoal.response.inputs import IntArray
-from shoal.response.limits.counted import contradiction, ends
+from shoal.response.limits.counted import contradictions, ends
 from shoal.response.limits.estimate import ExceedanceEstimate
 from shoal.response.limits.judged import Judged
 from shoal.response.limits.limit import Limit
@@ -30,31 +32,34 @@ def crosschecked(judged: Judged, machine: ResponseModel, values: Array, *, share
         return judged
     share = 2 / (len(judged.inputs) + 2) if shared else 1.0
     margins = judged.limit.margin(values[:, columns])
-    doubt = judged.passing.doubt or contradiction(judged.passing.estimate, margins, share)
-    return replace(judged, passing=replace(judged.passing, doubt=doubt))
+    found = [*judged.passing.findings, *contradictions(judged.passing.estimate, margins, share)]
+    return replace(judged, passing=replace(judged.passing, findings=found))
 
 
 def allowing(
     told: Statistics, machine: ResponseModel, limit: Limit, estimate: ExceedanceEstimate
-) -> tuple[Statistics, str]:
-    """Statistics whose errors allow for the probability of a limit; in words what they have missed, if anything."""
+) -> tuple[Statistics, list[Finding]]:
+    """Return statistics whose errors allow for the probability of a limit, and what they have missed, if anything."""
     columns = _columns(machine, limit)
     if columns is None:
-        return told, ""
+        return told, []
     mean, least = shifts(limit, told.mean[columns], told.error[columns], estimate)
     lacks = least > told.std[columns] + np.nan_to_num(told.std_error[columns])
     if not lacks.any():
-        return told, ""
+        return told, []
     error, std_error = told.error.copy(), told.std_error.copy()
     error[columns] = np.where(lacks, np.fmax(error[columns], mean), error[columns])
     std_error[columns] = np.where(lacks, least - told.std[columns], std_error[columns])
     k = int(np.where(lacks, least, 0.0).argmax())
-    missed = (
-        f"the deviation of {limit.place}.{limit.quantity} at {machine.times[k]:g} s is told as "
-        f"{told.std[columns][k]:.1e}, and what passes {limit.text} makes it {least[k]:.1e} at least, "
-        "so that the errors of mean and deviation are told larger"
+    missed = kinds.RARE_MISSED.found(
+        f"the standard deviation of {limit.place}.{limit.quantity} at {machine.times[k]:g} s is "
+        f"{told.std[columns][k]:.1e} by the runs, and what exceeds {limit.text} makes it {least[k]:.1e} at least, so "
+        "that the errors of mean and standard deviation are enlarged",
+        time=float(machine.times[k]),
+        std=float(told.std[columns][k]),
+        least=float(least[k]),
     )
-    return replace(told, error=error, std_error=std_error), missed
+    return replace(told, error=error, std_error=std_error), [missed]
 
 
 def shifts(limit: Limit, mean: Array, error: Array, estimate: ExceedanceEstimate) -> tuple[Array, Array]:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from scipy import special
 
 from shoal.error_budget import ErrorBudget
+from shoal.findings import Finding, message
+from shoal.response import findings as kinds
 from shoal.response.control import unseen
 from shoal.response.inputs import Inputs
 from shoal.response.limits.choice import Passing
@@ -83,11 +85,10 @@ class Between:
         return min(lower, float(low)), max(upper, float(high))
 
     @property
-    def doubt(self) -> str:
-        """Why it should not be believed, empty if it may be."""
-        if found := self.lower.reason_to_doubt or self.upper.reason_to_doubt:
-            return found
-        return undecided(max(self.beyond))
+    def findings(self) -> list[Finding]:
+        """Reasons for doubt: those of both ends, each once, and interval values that were not looked at."""
+        both = {one.text: one for one in (*self.lower.reasons, *self.upper.reasons)}
+        return [*both.values(), *undecided(max(self.beyond))]
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
@@ -113,13 +114,12 @@ class Between:
         }
 
 
-def undecided(beyond: float) -> str:
-    """Return whether so much of a reliability index is too much for interval values that were not looked at, in
-    words.
-    """
+def undecided(beyond: float) -> list[Finding]:
+    """Return a finding where interval values that were not looked at may change the reliability index too much."""
     if beyond <= MOST_BEYOND:
-        return ""
-    return f"the interval values that decide are not known: others may change beta by {beyond:.2g}"
+        return []
+    text = f"the interval values that decide are not known: others may change beta by {beyond:.2g}"
+    return [kinds.INTERVALS_UNDECIDED.found(text, beta=beyond)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,43 +164,73 @@ class Judged:
         return [one.passing.estimate for one in every if one.passing is not None]
 
     @property
-    def note(self) -> str:
-        """Remark for the user, empty if there is none."""
-        if self.shown is not None and self.shown.between is not None:
-            return f"the run shown passes it between the instants looked at, at {self.shown.between:.4g} s: state more"
-        if not self.estimates or not min(one.probability for one in self.estimates) > NEARLY_SURE:
-            return ""
-        if self.limit.is_required:
-            return f"{self.limit.text} is required, and hardly ever holds: is it what must not happen (--limit)?"
-        return f"{self.limit.text} states what must not happen, and nearly always does: is it required (--require)?"
+    def findings(self) -> list[Finding]:
+        """Findings about the result, reasons for doubt first."""
+        return [*self.reasons, *self._remarks]
 
     @property
-    def doubt(self) -> str:
-        """Why it should not be believed, empty if it may be."""
-        found = self.reason_to_doubt
-        return f"{self.limit.title}: {found}" if found else ""
+    def titled(self) -> list[Finding]:
+        """Findings that name the limit."""
+        return [replace(one, text=f"{self.limit.title}: {one.text}") for one in self.findings]
 
     @property
-    def reason_to_doubt(self) -> str:
-        """The same without the limit's name."""
+    def doubted(self) -> bool:
+        """Return whether the result is in doubt."""
+        return bool(self.reasons)
+
+    @property
+    def reasons(self) -> list[Finding]:
+        """Reasons for doubt."""
         if self.between is not None:
-            return self.between.doubt
-        found = self.passing.doubt if self.passing is not None else ""
-        if self.passing is None and self.kept is None:
-            found = "no run passes it, and the outer bounds do not show that none does"
-            if self.hidden:
-                least = f"the least margin of the runs is {self.margin:.3g} {self.limit.unit}"
-                found = f"{least}, and their known error {self.errors}; --tolerance finds a better model"
-        if not found and self.errors.unknown and self.passing is not None:
-            found = f"the error of the model is not known ({', '.join(self.errors.unknown)})"
-        if not found and (moved := self.moved) > MOST_BEYOND:
-            found = f"the known error of the model, {self.errors}, " + (
-                f"may change beta by {moved:.2g}" if math.isfinite(moved) else "decides whether any run passes it"
-            )
-        if not found and self.failed:
-            found = f"{self.failed} of {self.evaluations} runs failed even with smaller steps: {self.reason}"
-        if not found and self.shown is not None and self.shown.status != "ok":
-            found = f"the run that shows it is not borne out: {self.shown.message}"
+            return self.between.findings
+        return [*(self._undecided if self.passing is None else self._doubtful(self.passing)), *self._runs]
+
+    @property
+    def _undecided(self) -> list[Finding]:
+        """Reasons why intervals do not decide the limit."""
+        if self.kept is not None:
+            return []
+        if not self.hidden:
+            return [kinds.UNDECIDED.found("no run exceeds it, and the outer bounds do not show that none does")]
+        least = f"the least margin of the runs is {self.margin:.3g} {self.limit.unit}"
+        numbers = {"margin": self.margin, "error": self.errors.total or 0.0}
+        return [kinds.WITHIN_ERROR.found(f"{least}, and their known error {self.errors}", **numbers)]
+
+    def _doubtful(self, passing: Passing) -> list[Finding]:
+        """Reasons to doubt a probability: of its method, and the error of the model."""
+        found, moved = list(passing.findings), self.moved
+        if self.errors.unknown:
+            text = f"the error of the model is not known ({', '.join(self.errors.unknown)})"
+            found.append(kinds.ERROR_UNKNOWN.found(text))
+        if moved > MOST_BEYOND:
+            by = f"may change beta by {moved:.2g}" if math.isfinite(moved) else "decides whether any run exceeds it"
+            found.append(kinds.ERROR_DECIDES.found(f"the known error of the model, {self.errors}, {by}", beta=moved))
+        return found
+
+    @property
+    def _runs(self) -> list[Finding]:
+        """Runs for the limit that failed or were refused."""
+        found = []
+        if self.failed:
+            text = f"{self.failed} of {self.evaluations} runs failed even with smaller steps: {self.reason}"
+            found.append(kinds.LIMIT_RUNS_FAILED.found(text, failed=self.failed, runs=self.evaluations))
+        if self.shown is not None and self.shown.status != "ok":
+            text = f"the checks of the run that shows it reject it: {self.shown.message}"
+            found.append(kinds.SHOWN_REJECTED.found(text, time=self.shown.time))
+        return found
+
+    @property
+    def _remarks(self) -> list[Finding]:
+        """Findings that leave the result as it is."""
+        found = []
+        if self.shown is not None and self.shown.between is not None:
+            text = f"the run shown exceeds it between the instants looked at, at {self.shown.between:.4g} s"
+            found.append(kinds.EXCEEDED_BETWEEN.found(text, time=self.shown.between))
+        if self.estimates and (least := min(one.probability for one in self.estimates)) > NEARLY_SURE:
+            text = f"{self.limit.text} states what must not happen, and nearly always does"
+            if self.limit.is_required:
+                text = f"{self.limit.text} is required, and hardly ever holds"
+            found.append(kinds.OPPOSITE.found(text, probability=least))
         return found
 
     def to_json(self) -> dict[str, Any]:
@@ -218,7 +248,8 @@ class Judged:
             found |= self._probability(self.passing)
         else:
             found |= {"kept": self.kept, "margin": self.margin, "margin_outer": self.outer}
-        found |= {"evaluations": self.evaluations, "failed": self.failed, "doubt": self.doubt, "note": self.note}
+        found |= {"evaluations": self.evaluations, "failed": self.failed, "doubt": message(self.reasons)}
+        found |= {"findings": [one.to_json() for one in self.findings]}
         return dict(plain({**found, "shown_by": None if self.shown is None else self.shown.to_json()}))
 
     def _probability(self, passing: Passing) -> dict[str, Any]:

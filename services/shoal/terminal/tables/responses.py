@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from rich.markup import escape
 
+from shoal.findings import message
 from shoal.pictures.numbers import looked_at
 from shoal.terminal import screen
 
@@ -60,12 +61,13 @@ def response_table(response: Response) -> None:
         _limit(judged)
     if response.allocation is not None:
         _allocation(response.allocation)
-    mixed = f", but {response.mixes_starts}" if response.mixes_starts else ""
     screen.say(
-        f"status {response.status}{mixed}, {response.errors.brief}; {response.evaluations} runs in "
+        f"status {response.status}, {response.errors.brief}; {response.evaluations} runs in "
         f"{response.wall_s:.2f} s; {response.why}",
         style=screen.COLOURS[response.grade],
     )
+    screen.say(*(f"  {one.text}" for one in response.findings))
+    screen.say(*(f"next: {step}" for step in response.advice))
     for joint in response.inputs.joints:
         if joint.left:
             screen.say(
@@ -73,8 +75,6 @@ def response_table(response: Response) -> None:
             )
     if response.repeated or response.failed:
         screen.say(f"{response.repeated} runs were repeated with smaller steps, {response.failed} failed all the same")
-    if response.ok and response.statistics is not None and response.message:
-        screen.say(response.message)
     if response.bounds is not None:
         gap = response.bounds.gap
         known = (
@@ -125,13 +125,11 @@ def _limit(judged: Judged) -> None:
         how = "most probably with" if judged.passing.points else "nearest with"
     else:
         undecided = f"{judged.limit.verdict(True)} in all runs {at}, which proves nothing"
-        undecided = f"is not decided {at}: {judged.reason_to_doubt}" if judged.hidden else undecided
+        undecided = f"is not decided {at}: {message(judged.reasons)}" if judged.hidden else undecided
         holds = f"{judged.limit.verdict(True)} for all values {at}"
         says = {True: holds, False: judged.limit.verdict(False), None: undecided}
         screen.say(f"{title}: {says[judged.kept]}", style="bold")
         how = f"{judged.limit.event.removeprefix('is ')} with" if judged.kept is False else "nearest with"
-    if judged.note:
-        screen.say(f"  {judged.note}")
     if shown is not None:
         known = ", ".join(f"{name} = {value:.6g}" for name, value in shown.parameters.items())
         error = f", {judged.errors.brief}" if judged.errors.estimates else ""
