@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,10 +14,6 @@ from shoal.response.machine import ResponseModel
 from shoal.response.runs import CachedModel
 from shoal.scene.refined import refined
 from shoal.trajectory import Array, plain
-
-if TYPE_CHECKING:
-    from shoal.response.problem import UncertainProblem
-    from shoal.response.respond import ModelResponse
 
 MOST = 48
 """Runs that are repeated: those that attain most bounds."""
@@ -51,13 +47,6 @@ class Finer:
         """Without the columns."""
         known = np.isfinite(np.concatenate([self.lower, self.upper]))
         return {"mesh": self.mesh, "runs": self.runs, "failed": self.failed, "share_of_bounds": plain(known.mean())}
-
-
-def compare_meshes(problem: UncertainProblem, found: ModelResponse) -> Finer | None:
-    """Return the bounds that a finer mesh moves, where a model was chosen and there is time. Raises InputError."""
-    if problem.asked.tolerance is None or found.bounds is None or not problem.careful:
-        return None
-    return repeated(problem.model, found.runs)
 
 
 def repeated(machine: ResponseModel, runs: CachedModel) -> Finer | None:

@@ -6,10 +6,8 @@ the study may be off by, whatever its own method says: outer bounds and errors o
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,17 +19,12 @@ from shoal.findings import Finding
 from shoal.response import findings as kinds
 from shoal.response.boxes import Boxes, Ends
 from shoal.response.machine import ResponseModel, stable
+from shoal.response.respond import ModelResponse
 from shoal.response.result import Bounds
 from shoal.response.runs import CachedModel
 from shoal.response.statistics import Statistics
 from shoal.trajectory import Array
 
-if TYPE_CHECKING:
-    from shoal.response.problem import UncertainProblem
-    from shoal.response.respond import ModelResponse
-
-CHECKED = 6
-"""Extremal runs, or drawn ones, that are repeated more carefully."""
 NEGLIGIBLE = 0.01
 """An error below this share of what the runs differ by rejects none of them."""
 
@@ -79,23 +72,6 @@ class ModelErrors:
     def _wider(self, found: Ends) -> Ends:
         off = self.columns
         return replace(found, lower_outer=found.lower_outer - off, upper_outer=found.upper_outer + off)
-
-
-def known_errors(problem: UncertainProblem, found: ModelResponse) -> ModelErrors:
-    """Return the errors of decisive runs, where they are asked for and there is time. Raises InputError."""
-    if not problem.careful:
-        return unestimated(problem.model)
-    return model_errors(problem.model, found.runs, _decisive(found, problem.asked.seed))
-
-
-def _decisive(found: ModelResponse, seed: int) -> list[int]:
-    """Return the numbers of the runs that attain most bounds, or of some that were drawn."""
-    runs = found.runs
-    if found.bounds is None:
-        drawn = np.random.default_rng(seed).choice(len(runs.germs), min(CHECKED, len(runs.germs)), False)
-        return list(drawn.tolist())
-    used = Counter([*runs.values.argmin(axis=0).tolist(), *runs.values.argmax(axis=0).tolist()])
-    return [run for run, _ in used.most_common(CHECKED)]
 
 
 def unestimated(machine: ResponseModel) -> ModelErrors:

@@ -7,13 +7,12 @@ from dataclasses import replace
 
 from shoal.compile import clock
 from shoal.requests.uncertain import Uncertain
+from shoal.response.assess import allocate, allow_for_limits, assess_limits
 from shoal.response.conclusions import findings_about, withheld
-from shoal.response.finer import compare_meshes
-from shoal.response.limits.assess import allocate, allow_for_limits, assess_limits
 from shoal.response.markers import respond_markers
-from shoal.response.model_errors import known_errors
 from shoal.response.problem import read
 from shoal.response.result import Response
+from shoal.response.verify import compare_meshes, known_errors
 from shoal.scene import Scene
 
 
