@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import tempfile
 from collections.abc import Callable
@@ -23,6 +24,9 @@ os.environ["MPLBACKEND"] = "Agg"
 # While tests are collected, which some are once for every name: the user's own names are none of theirs.
 os.environ["SHOAL_LIBRARY"] = os.path.join(os.devnull, "none")
 
+# What is collected stays until the end: looking for garbage among it costs a quarter of the collection.
+gc.disable()
+
 Array = Any
 
 settings.register_profile("repeatable", derandomize=True, deadline=None)
@@ -32,6 +36,32 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "repeatable"))
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """What waits for servers, minutes long, begins first, so that the others are done beside it."""
     items.sort(key=lambda item: item.path.name != "test_up.py")
+
+
+TOGETHER = {
+    "pictures": ("tests/pictures/",),
+    "fits": tuple(f"tests/flows/test_{name}.py" for name in ("jobs", "models", "remembered", "report", "tracking")),
+}
+"""Files that share costly session fixtures run in one process, as the tests of a file do."""
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    if config.getvalue("dist") != "loadfile":
+        return None
+    from xdist.scheduler import LoadFileScheduling
+
+    class Scheduling(LoadFileScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            found = (name for name, begins in TOGETHER.items() if nodeid.startswith(begins))
+            return next(found, super()._split_scope(nodeid))
+
+    return Scheduling(config, log)
+
+
+def pytest_collection_finish() -> None:
+    gc.freeze()
+    gc.enable()
 
 
 def pytest_unconfigure() -> None:
