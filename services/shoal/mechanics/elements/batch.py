@@ -39,10 +39,18 @@ def coordinate(tile: Tile, family: Family, number: int, lane: int, side: int, k:
     raise NotImplementedError
 
 
-def nodal(
-    k: int, tile: Tile, space: tuple[int, ...], family: Family, number: int, lane: int, count: int, z: Array
-) -> Any:
-    """Vector k of `count` of the elements from this number on, a tuple as long as `space`."""
+def rows(like: tuple[int, ...], tile: Tile, family: Family, number: int, lane: int, side: int, k: int, z: Array) -> Any:
+    """Rows k, k + 1, ... of `side` of the elements from this number on, a tuple as long as `like`."""
+    raise NotImplementedError
+
+
+def coefficients(like: tuple[int, ...], tile: Tile, family: Family, number: int, lane: int, count: int, k: int) -> Any:
+    """Their coefficients k, k + 1, ... of `count`, a tuple as long as `like`."""
+    raise NotImplementedError
+
+
+def rests(like: tuple[int, ...], tile: Tile, family: Family, number: int, lane: int, k: int) -> Any:
+    """Entries k, k + 1, ... of their reference, a tuple as long as `like`."""
     raise NotImplementedError
 
 
@@ -98,16 +106,9 @@ def _coordinate(tile, family, number, lane, side, k, z):  # type: ignore[no-unty
 @overload(kept, jit_options=_INLINE)
 def _kept(space, w, at, step):  # type: ignore[no-untyped-def]
     width = len(EIGHT)
-    if space.count == len(PLANE):
-        return lambda space, w, at, step: (
-            simd.load(EIGHT, w, width * at),
-            simd.load(EIGHT, w, width * (at + step)),
-        )
-    return lambda space, w, at, step: (
-        simd.load(EIGHT, w, width * at),
-        simd.load(EIGHT, w, width * (at + step)),
-        simd.load(EIGHT, w, width * (at + 2 * step)),
-    )
+    if space.count == 1:
+        return lambda space, w, at, step: (simd.load(EIGHT, w, width * at),)
+    return lambda space, w, at, step: (simd.load(EIGHT, w, width * at), *kept(space[1:], w, at + step, step))
 
 
 @overload(kept_matrix, jit_options=_INLINE)
@@ -123,29 +124,49 @@ def _kept_matrix(space, w, at, down, right):  # type: ignore[no-untyped-def]
 
 @overload(zeros_like, jit_options=_INLINE)
 def _zeros_like(a):  # type: ignore[no-untyped-def]
-    if isinstance(a[0], types.BaseTuple):
-        if len(a) == 2:
-            return lambda a: (zeros_like(a[0]), zeros_like(a[1]))
-        return lambda a: (zeros_like(a[0]), zeros_like(a[1]), zeros_like(a[2]))
+    if not isinstance(a, types.BaseTuple):
+        return lambda a: simd.spread(EIGHT, 0.0)
     if len(a) == 1:
-        return lambda a: (simd.spread(EIGHT, 0.0),)
-    if len(a) == 2:
-        return lambda a: (simd.spread(EIGHT, 0.0), simd.spread(EIGHT, 0.0))
-    return lambda a: (simd.spread(EIGHT, 0.0), simd.spread(EIGHT, 0.0), simd.spread(EIGHT, 0.0))
+        return lambda a: (zeros_like(a[0]),)
+    return lambda a: (zeros_like(a[0]), *zeros_like(a[1:]))
 
 
-@overload(nodal, jit_options=_INLINE)
-def _nodal(k, tile, space, family, number, lane, count, z):  # type: ignore[no-untyped-def]
-    if space.count == len(PLANE):
-        return lambda k, tile, space, family, number, lane, count, z: (
-            coordinate(tile, family, number, lane, 2 * count, 2 * k, z),
-            coordinate(tile, family, number, lane, 2 * count, 2 * k + 1, z),
+@overload(rows, jit_options=_INLINE)
+def _rows(like, tile, family, number, lane, side, k, z):  # type: ignore[no-untyped-def]
+    if like.count == 1:
+        return lambda like, tile, family, number, lane, side, k, z: (
+            coordinate(tile, family, number, lane, side, k, z),
         )
-    return lambda k, tile, space, family, number, lane, count, z: (
-        coordinate(tile, family, number, lane, 3 * count, 3 * k, z),
-        coordinate(tile, family, number, lane, 3 * count, 3 * k + 1, z),
-        coordinate(tile, family, number, lane, 3 * count, 3 * k + 2, z),
+    return lambda like, tile, family, number, lane, side, k, z: (
+        coordinate(tile, family, number, lane, side, k, z),
+        *rows(like[1:], tile, family, number, lane, side, k + 1, z),
     )
+
+
+@overload(coefficients, jit_options=_INLINE)
+def _coefficients(like, tile, family, number, lane, count, k):  # type: ignore[no-untyped-def]
+    if like.count == 1:
+        return lambda like, tile, family, number, lane, count, k: (coefficient(tile, family, number, lane, count, k),)
+    return lambda like, tile, family, number, lane, count, k: (
+        coefficient(tile, family, number, lane, count, k),
+        *coefficients(like[1:], tile, family, number, lane, count, k + 1),
+    )
+
+
+@overload(rests, jit_options=_INLINE)
+def _rests(like, tile, family, number, lane, k):  # type: ignore[no-untyped-def]
+    if like.count == 1:
+        return lambda like, tile, family, number, lane, k: (rest(tile, family, number, lane, k),)
+    return lambda like, tile, family, number, lane, k: (
+        rest(tile, family, number, lane, k),
+        *rests(like[1:], tile, family, number, lane, k + 1),
+    )
+
+
+@njit(error_model="numpy", forceinline=True)
+def nodal(k, tile, space, family, number, lane, count, z):  # type: ignore[no-untyped-def]
+    """Vector k of `count` of the elements from this number on, a tuple as long as `space`."""
+    return rows(space, tile, family, number, lane, len(space) * count, len(space) * k, z)
 
 
 @overload(coefficient)

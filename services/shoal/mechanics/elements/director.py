@@ -26,14 +26,25 @@ from numba import njit
 from shoal.compile.pointers import pointer, shift
 from shoal.compile.simd import EIGHT, load, root, spread, store
 from shoal.mechanics.elements import beam
-from shoal.mechanics.elements.batch import VARIANT, add_rows, add_sum, coefficient, coordinate, put, rest, together
+from shoal.mechanics.elements.batch import (
+    VARIANT,
+    add_rows,
+    add_sum,
+    coefficient,
+    coefficients,
+    kept,
+    put,
+    rests,
+    rows,
+    together,
+)
 from shoal.mechanics.elements.director_strains import AXIAL, BENDING, STRAINS, gradient, strains
 from shoal.mechanics.elements.element import Element
 from shoal.mechanics.elements.families import PLAN, Entry, Family, Kernel, implement
 from shoal.mechanics.elements.hermite import curve
 from shoal.mechanics.elements.unstrained import unstrained
 from shoal.mechanics.numerics.tile import Array, Number, Tile
-from shoal.mechanics.numerics.tuples import dot, plus, times
+from shoal.mechanics.numerics.tuples import dot, minus, plus, times
 from shoal.scene import Rod
 from shoal.scene.sections import Section
 
@@ -44,6 +55,8 @@ _STEP = 5e-4
 """Of the differences of the force that are the stiffness, in slopes; times the length of the element in places."""
 _INSTANT = 1e-7
 """Of the differences of the strains that are their rates [s]."""
+_ROWS, _STIFF, _STRAINS = (0,) * ROWS, (0,) * (COEFFICIENTS - 1), (0,) * STRAINS
+"""Tuples as long as those of the rows, coefficients and strains."""
 
 
 class DirectorRods(Family):
@@ -53,82 +66,31 @@ class DirectorRods(Family):
 @njit(error_model="numpy", forceinline=True)
 def _numbers(tile, family, number, lane):  # type: ignore[no-untyped-def]
     """Coefficients without the retardation, and reference of elements."""
-    c = COEFFICIENTS
-    stiff = (
-        coefficient(tile, family, number, lane, c, 0),
-        coefficient(tile, family, number, lane, c, 1),
-        coefficient(tile, family, number, lane, c, 2),
-        coefficient(tile, family, number, lane, c, 3),
-        coefficient(tile, family, number, lane, c, 4),
-    )
-    return stiff, (
-        rest(tile, family, number, lane, 0),
-        rest(tile, family, number, lane, 1),
-        rest(tile, family, number, lane, 2),
-        rest(tile, family, number, lane, 3),
-        rest(tile, family, number, lane, 4),
-        rest(tile, family, number, lane, 5),
-        rest(tile, family, number, lane, 6),
-        rest(tile, family, number, lane, 7),
-        rest(tile, family, number, lane, 8),
-    )
-
-
-@njit(error_model="numpy", forceinline=True)
-def _vector(tile, family, number, lane, k, z):  # type: ignore[no-untyped-def]
-    """Three rows from the k-th on."""
-    x, y = coordinate(tile, family, number, lane, ROWS, k, z), coordinate(tile, family, number, lane, ROWS, k + 1, z)
-    return x, y, coordinate(tile, family, number, lane, ROWS, k + 2, z)
+    stiff = coefficients(_STIFF, tile, family, number, lane, COEFFICIENTS, 0)
+    return stiff, rests(_STRAINS, tile, family, number, lane, 0)
 
 
 @njit(error_model="numpy", forceinline=True)
 def _state(tile, family, number, lane, z):  # type: ignore[no-untyped-def]
     """All rows."""
-    a, b = _vector(tile, family, number, lane, 0, z), _vector(tile, family, number, lane, 3, z)
-    c, d = _vector(tile, family, number, lane, 6, z), _vector(tile, family, number, lane, 9, z)
-    e, f = _vector(tile, family, number, lane, 12, z), _vector(tile, family, number, lane, 15, z)
-    return (*a, *b, *c, *d, *e, *f)
+    return rows(_ROWS, tile, family, number, lane, ROWS, 0, z)
 
 
 @njit(error_model="numpy", forceinline=True)
 def _kept(w):  # type: ignore[no-untyped-def]
     """All rows, as the stiffness keeps them."""
-    e = len(EIGHT)
-    a, b, c = load(EIGHT, w, e), load(EIGHT, w, 2 * e), load(EIGHT, w, 3 * e)
-    d, f, g = load(EIGHT, w, 4 * e), load(EIGHT, w, 5 * e), load(EIGHT, w, 6 * e)
-    h, i, j = load(EIGHT, w, 7 * e), load(EIGHT, w, 8 * e), load(EIGHT, w, 9 * e)
-    k, m, n = load(EIGHT, w, 10 * e), load(EIGHT, w, 11 * e), load(EIGHT, w, 12 * e)
-    o, p, q = load(EIGHT, w, 13 * e), load(EIGHT, w, 14 * e), load(EIGHT, w, 15 * e)
-    r, s, t = load(EIGHT, w, 16 * e), load(EIGHT, w, 17 * e), load(EIGHT, w, 18 * e)
-    return a, b, c, d, f, g, h, i, j, k, m, n, o, p, q, r, s, t
-
-
-@njit(error_model="numpy", forceinline=True)
-def _moved(z, h, v):  # type: ignore[no-untyped-def]
-    """z + h v of all rows."""
-    a, b, c = plus(z[0:3], h, v[0:3]), plus(z[3:6], h, v[3:6]), plus(z[6:9], h, v[6:9])
-    d, e, f = plus(z[9:12], h, v[9:12]), plus(z[12:15], h, v[12:15]), plus(z[15:18], h, v[15:18])
-    return (*a, *b, *c, *d, *e, *f)
-
-
-@njit(error_model="numpy", forceinline=True)
-def _weighted(a, k, b):  # type: ignore[no-untyped-def]
-    """a + k b of strains."""
-    x, y, z = plus(a[0:3], k, b[0:3]), plus(a[3:6], k, b[3:6]), plus(a[6:9], k, b[6:9])
-    return (*x, *y, *z)
+    return kept(_ROWS, w, 1, 1)
 
 
 @njit(error_model="numpy", forceinline=True)
 def _rates(z, v, inverse):  # type: ignore[no-untyped-def]
     """Rates of the strains; those of stretching, which are stiff, without differences."""
-    ahead, behind = strains(_moved(z, _INSTANT, v), inverse), strains(_moved(z, -_INSTANT, v), inverse)
-    half = 0.5 / _INSTANT
-    first = times(half, plus(ahead[0:3], -1.0, behind[0:3]))
-    second = times(half, plus(ahead[3:6], -1.0, behind[3:6]))
+    ahead, behind = strains(plus(z, _INSTANT, v), inverse), strains(plus(z, -_INSTANT, v), inverse)
+    bent = times(0.5 / _INSTANT, minus(ahead[0:6], behind[0:6]))
     chord, turning = plus(z[9:12], -1.0, z[0:3]), plus(v[9:12], -1.0, v[0:3])
     middle, _ = curve(0.5, times(inverse, chord), z[3:6], z[12:15])
     moving, _ = curve(0.5, times(inverse, turning), v[3:6], v[12:15])
-    return (*first, *second, _grown(z[3:6], v[3:6]), _grown(middle, moving), _grown(z[12:15], v[12:15]))
+    return (*bent, _grown(z[3:6], v[3:6]), _grown(middle, moving), _grown(z[12:15], v[12:15]))
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -149,7 +111,7 @@ def force(tile: Tile, family: Family, z: Array, zdot: Array, f: Array, w: Array,
             if moving and family.plan[PLAN * number + VARIANT] == DAMPED:
                 eta = coefficient(tile, family, number, lane, COEFFICIENTS, COEFFICIENTS - 1)
                 rate = _rates(state, _state(tile, family, number, lane, zdot), stiff[0])
-                free = _weighted(free, -eta, rate)
+                free = plus(free, -eta, rate)
                 lost = spread(EIGHT, 0.0)
                 for k in range(len(BENDING)):
                     a, b, c = rate[3 * k], rate[3 * k + 1], rate[3 * k + 2]
@@ -158,9 +120,7 @@ def force(tile: Tile, family: Family, z: Array, zdot: Array, f: Array, w: Array,
                     lost = lost + AXIAL[k, 1] * stiff[1] * rate[6 + k] * rate[6 + k]
                 add_sum(tile, lane, count, w, power, eta * lost)
             _, g = gradient(state, stiff, free)
-            a, b, c = times(-1.0, g[0:3]), times(-1.0, g[3:6]), times(-1.0, g[6:9])
-            d, e, h = times(-1.0, g[9:12]), times(-1.0, g[12:15]), times(-1.0, g[15:18])
-            add_rows(tile, family, number, lane, count, w, f, (*a, *b, *c, *d, *e, *h))
+            add_rows(tile, family, number, lane, count, w, f, times(-1.0, g))
         number += count
 
 
@@ -201,8 +161,7 @@ def _columns(tile: Tile, viscous: bool, family: Family, z: Array, w: Array, out:
                     store(w, here, middle + sign * (1.0 + side // 2) * step)
                     other = free
                     if viscous:
-                        change = _weighted(strains(_kept(w), stiff[0]), -1.0, free)
-                        other = _weighted(free, -1.0 * eta, change)
+                        other = plus(free, -1.0 * eta, minus(strains(_kept(w), stiff[0]), free))
                     _, g = gradient(state if viscous else _kept(w), stiff, other)
                     for k in range(ROWS):
                         place = len(EIGHT) * (1 + ROWS + k)
@@ -305,9 +264,9 @@ def _mass(density: Number, section: Section, length: Number) -> list[list[Number
     """Return the mass of the cable, with the polar inertia of the section on the directors (interpolated linearly)."""
     cable = beam.mass_matrix(beam.CUBIC, density * section.area, length)
     polar = density * section.polar * length
-    rows = [beam.padded(row) for row in cable]
+    full = [beam.padded(row) for row in cable]
     first, second = [0.0, 0.0, polar / 3, 0.0, 0.0, polar / 6], [0.0, 0.0, polar / 6, 0.0, 0.0, polar / 3]
-    return [*rows[:2], first, *rows[2:], second]
+    return [*full[:2], first, *full[2:], second]
 
 
 def _stretching(axial: Number, length: Number) -> list[list[Number]]:

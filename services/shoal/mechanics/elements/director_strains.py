@@ -13,13 +13,19 @@ from numba import njit
 from shoal.compile.simd import inverse_root, reciprocal
 from shoal.mechanics.elements.hermite import collect, curve
 from shoal.mechanics.numerics.arc import arctangent, turn
-from shoal.mechanics.numerics.triples import across, cross
 from shoal.mechanics.numerics.tuples import dot, plus, times
+from shoal.mechanics.numerics.tuples import wedge as cross
 
 STRAINS = 9
 AXIAL = np.array([[0.0, 1 / 6], [0.5, 4 / 6], [1.0, 1 / 6]])
 BENDING = np.array([[0.5 - 0.5 / np.sqrt(3), 0.5], [0.5 + 0.5 / np.sqrt(3), 0.5]])
 """Points and weights of Lobatto's and Gauss's rules on (0, 1)."""
+
+
+@njit(error_model="numpy", forceinline=True)
+def _across(a, t, inverse):  # type: ignore[no-untyped-def]
+    """The derivative by s of what has the derivative a by t = s/|s|; inverse: 1/|s|."""
+    return times(inverse, plus(a, -dot(a, t), t))
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -137,11 +143,11 @@ def gradient(z, stiff, free):  # type: ignore[no-untyped-def]
         along = dot(t, by_h)
         by_t = plus(plus(by_t, -tc * ip, by_h), -along * ip, curl)
         g, g1, g2 = collect(
-            x, plus(across(by_t, t, ip), -dot(h, by_h) * ip, t), times(ip, plus(by_h, -along, t)), g, g1, g2
+            x, plus(_across(by_t, t, ip), -dot(h, by_h) * ip, t), times(ip, plus(by_h, -along, t)), g, g1, g2
         )
     by_e = plus(by_e, 1.0, cross(by_f, tm))
     by_tm = plus(by_tm, 1.0, cross(e0, by_f))
-    by_b = across(by_e, e0, ib)
+    by_b = _across(by_e, e0, ib)
     part = 2.0 * by_phi * reciprocal(c * c + s * s)
     y, xx = part * c, -part * s
     by_tm = plus(by_tm, y, m12)
@@ -150,8 +156,8 @@ def gradient(z, stiff, free):  # type: ignore[no-untyped-def]
     h1, a1, c1 = _carry_back(by_m1, d1, t1, tm, v1, j1)
     h2, a2, c2 = _carry_back(by_m2, d2, t2, tm, v2, j2)
     by_tm = plus(plus(by_tm, 1.0, c1), 1.0, c2)
-    g, g1, g2 = collect(0.5, across(by_tm, tm, im), zero, g, g1, g2)
-    g1 = plus(g1, 1.0, across(a1, t1, i1))
-    g2 = plus(g2, 1.0, across(a2, t2, i2))
+    g, g1, g2 = collect(0.5, _across(by_tm, tm, im), zero, g, g1, g2)
+    g1 = plus(g1, 1.0, _across(a1, t1, i1))
+    g2 = plus(g2, 1.0, _across(a2, t2, i2))
     ends = times(inverse, g)
     return energy, (-ends[0], -ends[1], -ends[2], *g1, *h1, *ends, *g2, *h2)

@@ -22,7 +22,18 @@ from numba import njit
 from shoal.compile.pointers import shift
 from shoal.compile.simd import EIGHT, load, spread, store
 from shoal.mechanics.elements import beam
-from shoal.mechanics.elements.batch import VARIANT, add_rows, add_sum, coefficient, coordinate, put, rest, together
+from shoal.mechanics.elements.batch import (
+    VARIANT,
+    add_rows,
+    add_sum,
+    coefficient,
+    coefficients,
+    kept,
+    put,
+    rests,
+    rows,
+    together,
+)
 from shoal.mechanics.elements.element import Element
 from shoal.mechanics.elements.families import PLAN, Entry, Family, Kernel, implement
 from shoal.mechanics.elements.simo_reissner_strains import (
@@ -36,12 +47,15 @@ from shoal.mechanics.elements.simo_reissner_strains import (
     strains,
 )
 from shoal.mechanics.numerics.tile import Array, Number, Tile
+from shoal.mechanics.numerics.tuples import minus, plus, times
 from shoal.scene import Rod
 from shoal.scene.sections import Section
 
 ROWS, COEFFICIENTS = 12, 5
 ELASTIC, DAMPED = 0, 1
 """Variants."""
+_ROWS, _STIFF, _STRAINS = (0,) * ROWS, (0,) * (COEFFICIENTS - 1), (0,) * STRAINS
+"""Tuples as long as those of the rows, coefficients and strains."""
 
 
 class ShearRods(Family):
@@ -51,64 +65,14 @@ class ShearRods(Family):
 @njit(error_model="numpy", forceinline=True)
 def _numbers(tile, family, number, lane):  # type: ignore[no-untyped-def]
     """Coefficients without the retardation, and reference of elements."""
-    c = COEFFICIENTS
-    stiff = (
-        coefficient(tile, family, number, lane, c, 0),
-        coefficient(tile, family, number, lane, c, 1),
-        coefficient(tile, family, number, lane, c, 2),
-        coefficient(tile, family, number, lane, c, 3),
-    )
-    return stiff, (
-        rest(tile, family, number, lane, 0),
-        rest(tile, family, number, lane, 1),
-        rest(tile, family, number, lane, 2),
-        rest(tile, family, number, lane, 3),
-        rest(tile, family, number, lane, 4),
-        rest(tile, family, number, lane, 5),
-        rest(tile, family, number, lane, 6),
-        rest(tile, family, number, lane, 7),
-    )
-
-
-@njit(error_model="numpy", forceinline=True)
-def _vectors(tile, family, number, lane, k, z):  # type: ignore[no-untyped-def]
-    """Six rows from the k-th on."""
-    a, b = coordinate(tile, family, number, lane, ROWS, k, z), coordinate(tile, family, number, lane, ROWS, k + 1, z)
-    c = coordinate(tile, family, number, lane, ROWS, k + 2, z)
-    d = coordinate(tile, family, number, lane, ROWS, k + 3, z)
-    e = coordinate(tile, family, number, lane, ROWS, k + 4, z)
-    return a, b, c, d, e, coordinate(tile, family, number, lane, ROWS, k + 5, z)
+    stiff = coefficients(_STIFF, tile, family, number, lane, COEFFICIENTS, 0)
+    return stiff, rests(_STRAINS, tile, family, number, lane, 0)
 
 
 @njit(error_model="numpy", forceinline=True)
 def _state(tile, family, number, lane, z):  # type: ignore[no-untyped-def]
     """All rows."""
-    return (*_vectors(tile, family, number, lane, 0, z), *_vectors(tile, family, number, lane, 6, z))
-
-
-@njit(error_model="numpy", forceinline=True)
-def _kept(w):  # type: ignore[no-untyped-def]
-    """All rows, as the matrices keep them."""
-    e = len(EIGHT)
-    a, b, c = load(EIGHT, w, e), load(EIGHT, w, 2 * e), load(EIGHT, w, 3 * e)
-    d, f, g = load(EIGHT, w, 4 * e), load(EIGHT, w, 5 * e), load(EIGHT, w, 6 * e)
-    h, i, j = load(EIGHT, w, 7 * e), load(EIGHT, w, 8 * e), load(EIGHT, w, 9 * e)
-    return a, b, c, d, f, g, h, i, j, load(EIGHT, w, 10 * e), load(EIGHT, w, 11 * e), load(EIGHT, w, 12 * e)
-
-
-@njit(error_model="numpy", forceinline=True)
-def _weighted(a, k, b):  # type: ignore[no-untyped-def]
-    """a + k b of strains."""
-    return (
-        a[0] + k * b[0],
-        a[1] + k * b[1],
-        a[2] + k * b[2],
-        a[3] + k * b[3],
-        a[4] + k * b[4],
-        a[5] + k * b[5],
-        a[6] + k * b[6],
-        a[7] + k * b[7],
-    )
+    return rows(_ROWS, tile, family, number, lane, ROWS, 0, z)
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -135,11 +99,10 @@ def force(tile: Tile, family: Family, z: Array, zdot: Array, f: Array, w: Array,
             if moving and family.plan[PLAN * number + VARIANT] == DAMPED:
                 eta = coefficient(tile, family, number, lane, COEFFICIENTS, COEFFICIENTS - 1)
                 rate = rates(state, _state(tile, family, number, lane, zdot), stiff[0])
-                free = _weighted(free, -eta, rate)
+                free = plus(free, -eta, rate)
                 add_sum(tile, lane, count, w, power, eta * _lost(stiff, rate))
             _, g = gradient(state, stiff, free)
-            down = -g[0], -g[1], -g[2], -g[3], -g[4], -g[5], -g[6], -g[7], -g[8], -g[9], -g[10], -g[11]
-            add_rows(tile, family, number, lane, count, w, f, down)
+            add_rows(tile, family, number, lane, count, w, f, times(-1.0, g))
         number += count
 
 
@@ -172,10 +135,10 @@ def _columns(tile: Tile, viscous: bool, family: Family, z: Array, w: Array, out:
             for column in range(ROWS):
                 for k in range(ROWS):
                     store(w, len(EIGHT) * (1 + k), spread(EIGHT, 1.0 if k == column else 0.0))
-                unit = _kept(w)
+                unit = kept(_ROWS, w, 1, 1)
                 if viscous:
-                    _, g = gradient(state, stiff, _weighted(bare, -eta, rates(state, unit, stiff[0])))
-                    g = _difference(g, still)
+                    _, g = gradient(state, stiff, plus(bare, -eta, rates(state, unit, stiff[0])))
+                    g = minus(g, still)
                 else:
                     g = change(state, unit, stiff, free)
                 for k in range(ROWS):
@@ -184,15 +147,6 @@ def _columns(tile: Tile, viscous: bool, family: Family, z: Array, w: Array, out:
                     row = first + ROWS * ROWS * number + ROWS * k + column
                     put(tile, lane, count, w, out, row, ROWS * ROWS, load(EIGHT, w, len(EIGHT) * (1 + ROWS + k)))
         number += count
-
-
-@njit(error_model="numpy", forceinline=True)
-def _difference(g, h):  # type: ignore[no-untyped-def]
-    """g - h of all rows."""
-    a, b, c = g[0] - h[0], g[1] - h[1], g[2] - h[2]
-    d, e, f = g[3] - h[3], g[4] - h[4], g[5] - h[5]
-    i, j, k = g[6] - h[6], g[7] - h[7], g[8] - h[8]
-    return a, b, c, d, e, f, i, j, k, g[9] - h[9], g[10] - h[10], g[11] - h[11]
 
 
 @njit(cache=True, error_model="numpy")
@@ -274,8 +228,8 @@ _POINTS = np.polynomial.legendre.leggauss(3)
 
 def _mass(density: Number, section: Section, length: Number) -> list[list[Number]]:
     """Return the mass of the cable, with the inertia of the sections, whose normal is of second degree."""
-    rows = [beam.padded(row) for row in beam.mass_matrix(beam.CUBIC, density * section.area, length)]
-    full = [*rows[:2], [0.0] * 6, *rows[2:], [0.0] * 6]
+    cable = [beam.padded(row) for row in beam.mass_matrix(beam.CUBIC, density * section.area, length)]
+    full = [*cable[:2], [0.0] * 6, *cable[2:], [0.0] * 6]
     for xi, weight in zip(*_POINTS, strict=True):
         normal = _normal((1 + xi) / 2, length)
         share = density * section.bending * length * weight / 2

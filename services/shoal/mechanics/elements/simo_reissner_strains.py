@@ -19,7 +19,6 @@ from numba import njit
 from shoal.compile.simd import heaviside, inverse_root, reciprocal
 from shoal.mechanics.elements.hermite import collect, curve
 from shoal.mechanics.numerics.arc import arctangent
-from shoal.mechanics.numerics.pairs import cross, quarter
 from shoal.mechanics.numerics.tuples import dot, plus, times
 
 STRAINS = 8
@@ -32,6 +31,18 @@ TURNED = 4.0 * (1.0 - 2.0 * BENDING[0, 0])
 
 
 @njit(error_model="numpy", forceinline=True)
+def _cross(a, b):  # type: ignore[no-untyped-def]
+    """a x b."""
+    return a[0] * b[1] - a[1] * b[0]
+
+
+@njit(error_model="numpy", forceinline=True)
+def _quarter(a):  # type: ignore[no-untyped-def]
+    """a turned by a right angle, counter-clockwise."""
+    return -a[1], a[0]
+
+
+@njit(error_model="numpy", forceinline=True)
 def _unit(d):  # type: ignore[no-untyped-def]
     """d/|d|."""
     return times(inverse_root(dot(d, d)), d)
@@ -40,7 +51,7 @@ def _unit(d):  # type: ignore[no-untyped-def]
 @njit(error_model="numpy", forceinline=True)
 def _by_angle(d):  # type: ignore[no-untyped-def]
     """The derivative of the angle of d."""
-    return times(reciprocal(dot(d, d)), quarter(d))
+    return times(reciprocal(dot(d, d)), _quarter(d))
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -53,7 +64,7 @@ def _middle(z, inverse):  # type: ignore[no-untyped-def]
 @njit(error_model="numpy", forceinline=True)
 def _between(e1, e2):  # type: ignore[no-untyped-def]
     """The angle from e1 to e2, below two right ones."""
-    return 2.0 * arctangent(cross(e1, e2) * reciprocal(1.0 + dot(e1, e2)))
+    return 2.0 * arctangent(_cross(e1, e2) * reciprocal(1.0 + dot(e1, e2)))
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -66,7 +77,7 @@ def _short(a, t):  # type: ignore[no-untyped-def]
 @njit(error_model="numpy", forceinline=True)
 def _bent(p, m, tau):  # type: ignore[no-untyped-def]
     """In the middle: a, t, cos(beta), sin(beta), beta, and 1 over the length of (a + g^3, t - tau)."""
-    a, t = dot(m, p), cross(m, p)
+    a, t = dot(m, p), _cross(m, p)
     g = _short(a, t)
     x, y = a + g * g * g, t - tau
     size = inverse_root(x * x + y * y)
@@ -87,7 +98,7 @@ def _by(bent):  # type: ignore[no-untyped-def]
 def strains(z, inverse):  # type: ignore[no-untyped-def]
     """The strains of elements; inverse: 1/L."""
     e1, e2, p = _unit(z[4:6]), _unit(z[10:12]), _middle(z, inverse)
-    one, two = (dot(e1, z[2:4]) - 1.0, cross(e1, z[2:4])), (dot(e2, z[8:10]) - 1.0, cross(e2, z[8:10]))
+    one, two = (dot(e1, z[2:4]) - 1.0, _cross(e1, z[2:4])), (dot(e2, z[8:10]) - 1.0, _cross(e2, z[8:10]))
     a, t, cosine, sine, beta, _ = _bent(p, _unit(plus(e1, 1.0, e2)), 0.5 * (one[1] + two[1]))
     mid, phi = (a * cosine + t * sine - 1.0, t * cosine - a * sine), _between(e1, e2)
     return (*one, *mid, *two, phi + TURNED * beta, phi - TURNED * beta)
@@ -96,7 +107,7 @@ def strains(z, inverse):  # type: ignore[no-untyped-def]
 @njit(error_model="numpy", forceinline=True)
 def _seen(p, u, e, w):  # type: ignore[no-untyped-def]
     """Return the changes of the parts of p along and across e, for a change u of p and a rotation w of e."""
-    return dot(e, u) + cross(e, p) * w, cross(e, u) - dot(e, p) * w
+    return dot(e, u) + _cross(e, p) * w, _cross(e, u) - dot(e, p) * w
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -116,7 +127,7 @@ def rates(z, v, inverse):  # type: ignore[no-untyped-def]
     m, w1, w2 = _unit(plus(e1, 1.0, e2)), dot(_by_angle(z[4:6]), v[4:6]), dot(_by_angle(z[10:12]), v[10:12])
     one, two = _seen(z[2:4], v[2:4], e1, w1), _seen(z[8:10], v[8:10], e2, w2)
     along, across = _seen(p, _middle(v, inverse), m, 0.5 * (w1 + w2))
-    bent = _bent(p, m, 0.5 * (cross(e1, z[2:4]) + cross(e2, z[8:10])))
+    bent = _bent(p, m, 0.5 * (_cross(e1, z[2:4]) + _cross(e2, z[8:10])))
     longer, slid, turn = _mid_change(bent, along, across, 0.5 * (one[1] + two[1]))
     return (*one, longer, slid, *two, w2 - w1 + TURNED * turn, w2 - w1 - TURNED * turn)
 
@@ -124,14 +135,14 @@ def rates(z, v, inverse):  # type: ignore[no-untyped-def]
 @njit(error_model="numpy", forceinline=True)
 def _node(s, e, axial, shear, stretch, slide):  # type: ignore[no-untyped-def]
     """At a node: energy, and the forces along e and across it; stretch, slide: free strains."""
-    longer, slid = dot(e, s) - 1.0 - stretch, cross(e, s) - slide
+    longer, slid = dot(e, s) - 1.0 - stretch, _cross(e, s) - slide
     return 0.5 * (axial * longer * longer + shear * slid * slid), axial * longer, shear * slid
 
 
 @njit(error_model="numpy", forceinline=True)
 def _back(p, e, along, across):  # type: ignore[no-untyped-def]
     """The derivatives by p and by the angle of e, of what changes so with the parts of p along e and across it."""
-    return plus(times(along, e), across, quarter(e)), along * cross(e, p) - across * dot(e, p)
+    return plus(times(along, e), across, _quarter(e)), along * _cross(e, p) - across * dot(e, p)
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -171,7 +182,7 @@ def gradient(z, stiff, free):  # type: ignore[no-untyped-def]
     s1, d1, s2, d2 = z[2:4], z[4:6], z[8:10], z[10:12]
     e1, e2, p = _unit(d1), _unit(d2), _middle(z, inverse)
     m, w = _unit(plus(e1, 1.0, e2)), AXIAL[0, 1]
-    bent = _bent(p, m, 0.5 * (cross(e1, s1) + cross(e2, s2)))
+    bent = _bent(p, m, 0.5 * (_cross(e1, s1) + _cross(e2, s2)))
     force, across, first, second = _stresses(bent, _between(e1, e2), stiff, free)
     squares = force * force / (AXIAL[1, 1] * ea) + across * across / (AXIAL[1, 1] * ga)
     squares = squares + (first * first + second * second) / (BENDING[0, 1] * ei)
@@ -231,14 +242,14 @@ def _back_change(p, u, e, w, along, across, dalong, dacross):  # type: ignore[no
     """Return the change of `_back` for a change u of p, a rotation w of e, and changes of along and across."""
     more, turn = _back(p, e, dalong, dacross)
     a, t = _seen(p, u, e, w)
-    return plus(more, w, plus(times(along, quarter(e)), -across, e)), turn + along * t - across * a
+    return plus(more, w, plus(times(along, _quarter(e)), -across, e)), turn + along * t - across * a
 
 
 @njit(error_model="numpy", forceinline=True)
 def _angle_change(s, u):  # type: ignore[no-untyped-def]
     """The change of `_by_angle` with that of s."""
     square = reciprocal(dot(s, s))
-    return plus(times(square, quarter(u)), -2.0 * dot(s, u) * square, _by_angle(s))
+    return plus(times(square, _quarter(u)), -2.0 * dot(s, u) * square, _by_angle(s))
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -271,7 +282,7 @@ def change(z, v, stiff, free):  # type: ignore[no-untyped-def]
     v1, v2, p, u = v[4:6], v[10:12], _middle(z, inverse), _middle(v, inverse)
     e1, e2, w = _unit(d1), _unit(d2), AXIAL[0, 1]
     m, w1, w2 = _unit(plus(e1, 1.0, e2)), dot(_by_angle(d1), v1), dot(_by_angle(d2), v2)
-    bent = _bent(p, m, 0.5 * (cross(e1, s1) + cross(e2, s2)))
+    bent = _bent(p, m, 0.5 * (_cross(e1, s1) + _cross(e2, s2)))
     stresses = _stresses(bent, _between(e1, e2), stiff, free)
     by_a, by_t, by_tau, _ = _by_parts(bent, *stresses)
     _, by_m = _back(p, m, by_a, by_t)

@@ -1,5 +1,6 @@
 """Vectors of R^d as tuples, of numbers or of SIMD vectors, and bivectors, inside kernels.
 
+Sums, multiples and scalar products are those of tuples of any length, by recursion when a kernel is compiled.
 The wedge product a ^ b has d (d - 1)/2 components: one number in the plane, the cross product in space. Matrices are
 tuples of rows.
 """
@@ -63,42 +64,32 @@ def plus_skew(a: Any, m: Any) -> Any:
 def _dot(a, b):  # type: ignore[no-untyped-def]
     if len(a) == 1:
         return lambda a, b: a[0] * b[0]
-    if len(a) == 2:
-        return lambda a, b: a[0] * b[0] + a[1] * b[1]
-    return lambda a, b: a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    return lambda a, b: dot(a[:-1], b[:-1]) + a[-1] * b[-1]
 
 
 @overload(times, jit_options=_INLINE)
 def _times(k, a):  # type: ignore[no-untyped-def]
     if len(a) == 1:
         return lambda k, a: (k * a[0],)
-    if len(a) == 2:
-        return lambda k, a: (k * a[0], k * a[1])
-    return lambda k, a: (k * a[0], k * a[1], k * a[2])
+    return lambda k, a: (k * a[0], *times(k, a[1:]))
 
 
 @overload(plus, jit_options=_INLINE)
 def _plus(a, k, b):  # type: ignore[no-untyped-def]
-    if isinstance(a[0], types.BaseTuple):
-        if len(a) == 2:
-            return lambda a, k, b: (plus(a[0], k, b[0]), plus(a[1], k, b[1]))
-        return lambda a, k, b: (plus(a[0], k, b[0]), plus(a[1], k, b[1]), plus(a[2], k, b[2]))
+    if not isinstance(a, types.BaseTuple):
+        return lambda a, k, b: a + k * b
     if len(a) == 1:
-        return lambda a, k, b: (a[0] + k * b[0],)
-    if len(a) == 2:
-        return lambda a, k, b: (a[0] + k * b[0], a[1] + k * b[1])
-    return lambda a, k, b: (a[0] + k * b[0], a[1] + k * b[1], a[2] + k * b[2])
+        return lambda a, k, b: (plus(a[0], k, b[0]),)
+    return lambda a, k, b: (plus(a[0], k, b[0]), *plus(a[1:], k, b[1:]))
 
 
 @overload(minus, jit_options=_INLINE)
 def _minus(a, b):  # type: ignore[no-untyped-def]
-    if isinstance(a[0], types.BaseTuple):
-        return lambda a, b: plus(a, -1.0, b)
+    if not isinstance(a, types.BaseTuple):
+        return lambda a, b: a - b
     if len(a) == 1:
-        return lambda a, b: (a[0] - b[0],)
-    if len(a) == 2:
-        return lambda a, b: (a[0] - b[0], a[1] - b[1])
-    return lambda a, b: (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+        return lambda a, b: (minus(a[0], b[0]),)
+    return lambda a, b: (minus(a[0], b[0]), *minus(a[1:], b[1:]))
 
 
 @overload(wedge, jit_options=_INLINE)
@@ -117,9 +108,9 @@ def _facing(b, m):  # type: ignore[no-untyped-def]
 
 @overload(outer, jit_options=_INLINE)
 def _outer(a, b):  # type: ignore[no-untyped-def]
-    if len(a) == 2:
-        return lambda a, b: (times(a[0], b), times(a[1], b))
-    return lambda a, b: (times(a[0], b), times(a[1], b), times(a[2], b))
+    if len(a) == 1:
+        return lambda a, b: (times(a[0], b),)
+    return lambda a, b: (times(a[0], b), *outer(a[1:], b))
 
 
 @overload(plus_identity, jit_options=_INLINE)
