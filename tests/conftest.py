@@ -5,12 +5,13 @@ from __future__ import annotations
 import gc
 import os
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import settings
+from numba.core import event
 from scipy.integrate import solve_ivp
 from shoal.home import prepare_kernel_cache
 
@@ -57,6 +58,53 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
             return next(found, super()._split_scope(nodeid))
 
     return Scheduling(config, log)
+
+
+class Compiled(event.Listener):
+    """Names of kernels of the library that were not in the cache, the outermost of each compilation."""
+
+    def __init__(self) -> None:
+        self.names: list[str] = []
+        self._depth = 0
+
+    def on_start(self, event: Any) -> None:
+        function = event.data["dispatcher"].py_func
+        if self._depth == 0 and function.__module__.startswith("shoal."):
+            self.names.append(f"{function.__module__}.{function.__qualname__}")
+        self._depth += 1
+
+    def on_end(self, event: Any) -> None:
+        self._depth -= 1
+
+
+COMPILED = Compiled()
+event.register("numba:compile", COMPILED)
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--kernels-known", action="store_true", help="a test fails that compiles a kernel unannounced")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Iterator[None]:
+    """Kernels that `make kernels` does not know are named: a fast test is to use others, or to be marked `compiles`."""
+    report: Any = yield
+    if COMPILED.names and not any(map(item.get_closest_marker, ("compiles", "slow"))):
+        report.user_properties.append(("compiled", sorted(set(COMPILED.names))))
+        if item.config.getoption("kernels_known") and report.passed:
+            report.outcome = "failed"
+            report.longrepr = f"compiles {', '.join(COMPILED.names)}, which `make kernels` does not know"
+    COMPILED.names.clear()
+    return report
+
+
+def pytest_terminal_summary(terminalreporter: Any) -> None:
+    reports = [one for kind in ("", "passed", "failed") for one in terminalreporter.stats.get(kind, [])]
+    found = {one.nodeid: names for one in reports for key, names in one.user_properties if key == "compiled"}
+    if found:
+        terminalreporter.section("fast tests that compiled kernels which `make kernels` does not know")
+        for nodeid, names in sorted(found.items()):
+            terminalreporter.line(f"{nodeid}: {', '.join(names)}")
 
 
 def pytest_collection_finish() -> None:
