@@ -134,6 +134,23 @@ print(hashlib.sha256("".join(content.key(kernel, "") for kernel in kernels).enco
 """
 
 
+def test_no_key_follows_what_a_program_has_done(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A function of Python that has the name of an attribute in a kernel counts as called, with the tables it fills."""
+    from shoal.mechanics import kernels, march
+    from shoal.mechanics.analysis import evaluations
+
+    def keys() -> list[str]:
+        content._parts.cache_clear()
+        content._hash.cache_clear()
+        names = [value for one in (kernels, march, evaluations) for value in vars(one).values()]
+        return [content.key(value.py_func, "") for value in names if isinstance(value, Dispatcher)]
+
+    before = keys()
+    for module, table in ((kernels, "_FOUND"), (kernels, "_READY"), (march, "_LOOPS"), (evaluations, "_ADDRESSES")):
+        monkeypatch.setattr(module, table, {"some": len(table)})
+    assert keys() == before
+
+
 @pytest.mark.slow
 def test_all_processes_have_the_same_keys() -> None:
     """The order of a set, as of the options of fast mathematics, is another in each process."""

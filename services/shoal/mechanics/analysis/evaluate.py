@@ -105,7 +105,7 @@ class Evaluator:
     def remember(self, q: Array) -> None:
         """Count the turns of angle forces after a move of less than half a turn to q."""
         self._enter(q, None)
-        evaluations.remember(SINGLE, self._arrays, self._room)
+        evaluations.count_turns(SINGLE, self._arrays, self._room)
 
     def at(self, q: Array, v: Array | None = None, t: float = 0.0, *, load: float = 1.0) -> Evaluation:
         """Look at the state q, v (default: at rest) at time t [s]; `load` scales gravity and applied loads."""
@@ -138,7 +138,7 @@ class Evaluator:
         for k, number in enumerate(sample.tolist()):
             self._room.z[:n] = way[k]
             if k > 0:
-                evaluations.remember(SINGLE, self._arrays, self._room)
+                evaluations.count_turns(SINGLE, self._arrays, self._room)
             if number >= 0:
                 self._room.zdot[:n] = v[number]
                 turns[number] = self._room.memory
@@ -152,7 +152,7 @@ class Evaluator:
         for k, pose in enumerate(way):
             self._room.z[: self.model.unknowns] = pose
             self._room.memory[:] = turns[k]
-            evaluations.energies(SINGLE, self._arrays, self._room)
+            evaluations.find_energies(SINGLE, self._arrays, self._room)
             energy[k] = self._room.energy[1]
         return energy
 

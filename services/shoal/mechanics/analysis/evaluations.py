@@ -53,12 +53,12 @@ def accelerate(tile: Tile, arrays: Arrays, room: Work, t: float, tolerance: floa
     _run(_accelerate, tile, arrays, room, t, tolerance)
 
 
-def energies(tile: Tile, arrays: Arrays, room: Work) -> None:
+def find_energies(tile: Tile, arrays: Arrays, room: Work) -> None:
     """The energies [J], into room.energy."""
     _run(_stored, tile, arrays, room)
 
 
-def remember(tile: Tile, arrays: Arrays, room: Work) -> None:
+def count_turns(tile: Tile, arrays: Arrays, room: Work) -> None:
     """Count the turns of angle forces."""
     _run(_remember, tile, arrays, room)
 
