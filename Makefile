@@ -76,7 +76,7 @@ bench: setup  ## speed and accuracy against the other engines
 	@$(BIN)/python -m shoal_validation.benchmarks
 
 charts: setup  ## every chart and table of docs/ anew (an hour)
-	@for part in work_precision stability ablation inverse_precision selection uncertain; do \
+	@for part in work_precision stability ablation inverse_precision selection uncertain gallery; do \
 	  echo "== $$part"; $(BIN)/python -m shoal_validation.$$part; \
 	done
 

@@ -17,7 +17,12 @@ from pydantic.fields import FieldInfo
 
 def on_page_markdown(markdown: str, **_: Any) -> str:
     """Put what is generated where a page has the mark for it."""
-    marks = {"<!-- commands -->": commands, "<!-- findings -->": findings, "<!-- scene fields -->": scene_fields}
+    marks = {
+        "<!-- commands -->": commands,
+        "<!-- findings -->": findings,
+        "<!-- gallery -->": gallery,
+        "<!-- scene fields -->": scene_fields,
+    }
     for mark, generate in marks.items():
         markdown = markdown.replace(mark, generate()) if mark in markdown else markdown
     return markdown
@@ -45,6 +50,18 @@ def _kinds(module: ModuleType, implied: str) -> str:
         if isinstance(one, Kind):
             rows.append(f"| `{one.code}` | {one.severity} | {one.meaning} | {one.implies} | {one.remedy} |")
     return "\n".join(rows)
+
+
+def gallery() -> str:
+    """A card for each machine of the gallery: its moving picture, what it shows, and its scene."""
+    from shoal_validation.gallery import machines
+
+    cards = []
+    for machine in machines():
+        scene = f"[`{machine.name}`](gallery/{machine.name}.yaml)" if machine.own else f"`{machine.name}`, built in"
+        picture = f"![{machine.name} in motion](gallery/{machine.name}.gif){{ loading=lazy }}"
+        cards.append(f"-   {picture}\n\n    {scene}: {machine.scene.description}\n")
+    return '<div class="grid cards" markdown>\n\n' + "\n".join(cards) + "\n</div>"
 
 
 def commands() -> str:

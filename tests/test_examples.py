@@ -7,7 +7,11 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from PIL import Image
+from shoal.scene import load_scene
+from shoal_validation.gallery import Machine, machines
 
 ROOT = Path(__file__).parents[1]
 RECORDING = ROOT.parent / "shared" / "data" / "multiarm_kaheman" / "single_1kHz.csv.gz"
@@ -45,3 +49,23 @@ def test_slider_crank_passes_where_others_end(example: Any) -> None:
 def test_recording_tells_the_ratio_of_weight_to_inertia(example: Any) -> None:
     # The authors' own estimate from the whole recording: 0.14758 * 0.14775 * 9.81 / (1.0912e-4 + 0.14758 * 0.14775^2).
     assert example("recording.py", str(RECORDING))["ratio"] == pytest.approx(64.22, rel=5e-3)
+
+
+GALLERY = sorted((ROOT / "docs" / "gallery").glob("*.yaml"))
+
+
+@pytest.mark.parametrize("path", GALLERY, ids=lambda path: path.stem)
+def test_machine_of_the_gallery_is_short_and_shown(path: Path) -> None:
+    assert load_scene(path).name == path.stem
+    assert len(path.read_text().splitlines()) <= 15
+    with Image.open(path.with_suffix(".gif")) as picture:
+        assert picture.n_frames == 60
+
+
+@pytest.mark.slow  # Kernels for some of its joints and elements.
+@pytest.mark.parametrize("machine", machines(), ids=lambda machine: machine.name)
+def test_machine_of_the_gallery_moves_within_its_known_error(machine: Machine) -> None:
+    run = machine.motion()
+    lengths = np.ptp(run.points[..., 0], axis=0)
+    assert run.errors.total is not None
+    assert run.errors.total < 0.05 * lengths.max()

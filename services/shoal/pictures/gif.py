@@ -70,11 +70,12 @@ def _stage(found: DrawnMotion, title: str) -> tuple[Figure, list[tuple[Any, Any]
         shown.append((drawn, path))
 
     axes.plot(*found.ground.T, "s", color=GREY, markersize=8)
-    for thin in found.thin.values():
+    for thin in (*found.thin.values(), *found.links.values()):
         line(thin, "-", "", color=GREY, linewidth=0.8)
     for outline in found.outlines.values():
         line(outline, "o-", "", color=BLUE, linewidth=3, markersize=4, markevery=[0, -1])
     for number, path in enumerate(found.markers.values()):
+        axes.plot(*path.T, "-", color=VERMILION, linewidth=0.8, alpha=0.4)
         line(path, "o", "" if number else "marker", color=VERMILION, markersize=6)
     for number, path in enumerate(found.measured.values()):
         line(path, "o", "" if number else "measured", color=BLACK, fillstyle="none", markersize=11)

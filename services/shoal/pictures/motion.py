@@ -10,6 +10,7 @@ import numpy as np
 
 from shoal.engines.contract import Engine
 from shoal.errors import ComputationError, InputError
+from shoal.pictures.links import At, Links
 from shoal.pictures.outline import ground, outlined
 from shoal.pictures.solids import Bar, MarkedScene
 from shoal.pictures.views import ViewDirection, views
@@ -30,8 +31,9 @@ class DrawnMotion:
     outlines: points of each body [m], (frames, points, d); markers: of the model [m], (frames, d)
     measured: places [m], (frames, d), nan where none was measured near that time; directions: measured angles [rad]
     behind: outlines of another machine that is drawn below [m], (frames, points, d)
-    In space: bars of bodies; links: places that a spring or a distance joins [m], (frames, 2, 3); axes of joints: a
-    point [m] and a direction, (frames, 2, 3); up: the direction against gravity, along an axis, (3,).
+    links: places that a spring or a distance joins [m], (frames, 2, d)
+    In space: bars of bodies; axes of joints: a point [m] and a direction, (frames, 2, 3); up: the direction against
+    gravity, along an axis, (3,).
     Of a view on paper: thin lines [m], (frames, points, 2), nan between them; labels of the coordinates.
     """
 
@@ -43,8 +45,8 @@ class DrawnMotion:
     measured: dict[str, Array] = field(default_factory=dict)
     directions: dict[str, Array] = field(default_factory=dict)
     behind: dict[str, Array] = field(default_factory=dict)
-    bars: dict[str, Bar] = field(default_factory=dict)
     links: dict[str, Array] = field(default_factory=dict)
+    bars: dict[str, Bar] = field(default_factory=dict)
     axes: dict[str, Array] = field(default_factory=dict)
     up: Array | None = None
     thin: dict[str, Array] = field(default_factory=dict)
@@ -58,7 +60,8 @@ class DrawnMotion:
     @property
     def box(self) -> tuple[Array, Array]:
         """Lower left and upper right corner [m] of all that is shown, (2,) each."""
-        moving = (*self.outlines.values(), *self.behind.values(), *self.measured.values(), *self.thin.values())
+        parts = (self.outlines, self.behind, self.measured, self.links, self.thin)
+        moving = (path for part in parts for path in part.values())
         solid = (bar.edges for bar in self.bars.values())
         every = np.concatenate([np.reshape(x, (-1, self.ground.shape[1])) for x in (*moving, *solid, self.ground)])
         return np.nanmin(every, axis=0), np.nanmax(every, axis=0)
@@ -94,10 +97,10 @@ class DrawnMotion:
             markers=flat(self.markers),
             measured=flat(self.measured),
             behind=flat(self.behind),
-            thin=flat(thin | self.links),
+            links=flat(self.links),
+            thin=flat(thin),
             labels=view.labels,
             bars={},
-            links={},
             axes={},
             up=None,
         )
@@ -114,25 +117,27 @@ def scene_motion(scene: Scene, engine: Engine, until: float, frames: int = _FRAM
     if count < 2:
         raise ComputationError(f"{scene.name}: there is no motion to show: {seen.message or seen.status[0]}")
     markers = {name: seen.marker(name)[:count] for name in scene.markers}
-    shown = read(lambda name: seen.marker(name)[:count])
+    shown = read(lambda name: seen.marker(name)[:count], seen.times[:count])
     return DrawnMotion(scene.name, seen.times[:count], ground(scene), markers=markers, **shown)
 
 
-def traced_out(scene: Scene) -> tuple[Scene, Callable[[Callable[[str], Array]], dict[str, Any]]]:
-    """The scene with markers that make its bodies visible, and what makes the fields of a Motion of their places.
+def traced_out(scene: Scene) -> tuple[Scene, Callable[[At, Array], dict[str, Any]]]:
+    """Return the scene with markers that show its bodies, and what makes fields of a DrawnMotion of their paths.
 
-    Places of a marker by its name: [m], (frames, d).
+    These are the paths of a marker by its name [m], (frames, d), and the times of the motion [s], (frames,).
     """
     traced, points = outlined(scene)
+    links = Links(scene)
     solids = MarkedScene(traced, points, scene) if scene.dimensions == 3 else None
+    data = (traced if solids is None else solids.scene).model_dump(mode="json")
+    data["markers"] |= links.markers
 
-    def read(at: Callable[[str], Array]) -> dict[str, Any]:
+    def read(at: At, times: Array) -> dict[str, Any]:
         outlines = {body: np.stack([at(name) for name in names], axis=1) for body, names in points.items()}
-        if solids is None:
-            return {"outlines": outlines}
-        return {"outlines": outlines, "up": upwards(scene), **solids.shown(at, len(next(iter(outlines.values()))))}
+        shown = {"outlines": outlines, "links": links.shown(at, times)}
+        return shown if solids is None else {**shown, "up": upwards(scene), **solids.shown(at, len(times))}
 
-    return traced if solids is None else solids.scene, read
+    return Scene.parse(data, scene.name), read
 
 
 def upwards(scene: Scene) -> Array:
@@ -168,7 +173,7 @@ def motion(answer: Answer, recording: str, frames: int = _FRAMES) -> DrawnMotion
     measured = {m: _place(found, view) for m, found in places.items() if needed <= found.keys()}
     directions = {m: found["angle"] + view["tilt"] for m, found in places.items() if "angle" in found}
     fixed = ground(scene)
-    shown = read(seen.marker)
+    shown = read(seen.marker, seen.times)
     return DrawnMotion(recording, times, fixed, markers=markers, measured=measured, directions=directions, **shown)
 
 
@@ -196,6 +201,7 @@ def plain_motion(found: DrawnMotion) -> dict[str, Any]:
         "ground": plain(found.ground),
         "behind": {name: plain(np.round(x, digits)) for name, x in found.behind.items()},
         "outlines": {name: plain(np.round(x, digits)) for name, x in found.outlines.items()},
+        "links": {name: plain(np.round(x, digits)) for name, x in found.links.items()},
         "markers": {name: plain(np.round(x, digits)) for name, x in found.markers.items()},
         "measured": {name: plain(np.round(x, digits)) for name, x in found.measured.items()},
         "directions": {name: plain(np.round(x, 4)) for name, x in found.directions.items()},
@@ -220,6 +226,5 @@ def _plain_space(found: DrawnMotion, digits: int) -> dict[str, Any]:
         "front": [plain(looks[0].right), plain(looks[0].up)],
         "views": {view.name: [view.yaw, view.pitch] for view in looks},
         "bars": bars,
-        "links": {name: plain(np.round(x, digits)) for name, x in found.links.items()},
         "axes": {name: plain(np.round(x, digits + 1)) for name, x in found.axes.items()},
     }

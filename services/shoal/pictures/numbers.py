@@ -23,9 +23,10 @@ def looked_at(times: Array) -> str:
 
 
 def length(metres: float | None) -> str:
-    """A length in the unit that needs no zeros."""
+    """Return a length with three digits in the unit that needs no zeros."""
     if metres is None or not np.isfinite(metres):
         return "unknown"
+    metres = float(f"{metres:.3g}")
     if metres == 0:
         return "0 m"
     for unit, size in (("m", 1.0), ("mm", 1e-3), ("µm", 1e-6)):

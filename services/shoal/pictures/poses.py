@@ -60,7 +60,7 @@ def _draw(axes: Axes, found: DrawnMotion, way: str) -> None:
     chosen = np.linspace(0, len(found.times) - 1, count).round().astype(int)
     for number, k in enumerate(chosen):
         strength = min(1.0, 0.2 + 0.8 * number / max(count - 1, 1))
-        for line in found.thin.values():
+        for line in (*found.thin.values(), *found.links.values()):
             axes.plot(*line[k].T, color=GREY, alpha=strength, linewidth=0.7)
         for outline in found.outlines.values():
             axes.plot(*outline[k].T, "o-", markersize=2.5, markevery=[0, -1], color=BLUE, alpha=strength, linewidth=2.2)

@@ -44,4 +44,5 @@ def rest_motion(found: Equilibrium) -> DrawnMotion:
         return np.asarray(seen[numbers[name]])
 
     markers = {name: at(name) for name in found.scene.markers}
-    return DrawnMotion(found.scene.name, np.array([0.0, 1.0]), ground(found.scene), markers=markers, **read(at))
+    shown = read(at, np.zeros(2))
+    return DrawnMotion(found.scene.name, np.array([0.0, 1.0]), ground(found.scene), markers=markers, **shown)

@@ -8,16 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from shoal.pictures.links import At
 from shoal.pictures.outline import INSIDE
 from shoal.scene import GROUND, Attachment, Body, RigidBody, Rod, Scene
-from shoal.scene.joints import Coupling, Cylindrical, Distance, Joint, Planar, Revolute, Slider, Universal
-from shoal.scene.loads import Spring
+from shoal.scene.joints import Coupling, Cylindrical, Joint, Planar, Revolute, Slider, Universal
 from shoal.trajectory import Array
 
 _LEAST = 1e-9
 """A cuboid thinner than this share of its length is none."""
-At = Callable[[str], Array]
-"""The path of an added marker [m], (frames, 3)."""
 
 
 @dataclass(frozen=True)
@@ -59,15 +57,15 @@ class MarkedScene:
         self._outlines, self._original, self._markers = outlines, original, dict[str, dict[str, Any]]()
         self._attitudes: dict[str, tuple[list[str], float]] = {}
         self._bars = {name: bar for name, body in original.bodies.items() if (bar := self._bar(name, body))}
-        self._links = self._joined_by_lines()
         self._axes = [axis for name, joint in original.joints.items() for axis in self._axes_of(name, joint)]
         data = traced.model_dump(mode="json")
         data["markers"] |= self._markers
         self.scene = Scene.parse(data, traced.name)
 
     def shown(self, at: At, frames: int) -> dict[str, Any]:
-        """Bars of the bodies; links between places that a spring or a distance joins [m], and of each axis of a joint a
-        point [m] and the direction, (frames, 2, 3) each; at: the path of an added marker, (frames, 3).
+        """Return bars of the bodies, and of each axis of a joint a point [m] and the direction, (frames, 2, 3).
+
+        at: the path of an added marker, (frames, 3).
         """
 
         def pair(*ends: Callable[[At], Array]) -> Array:
@@ -75,7 +73,6 @@ class MarkedScene:
 
         return {
             "bars": {name: bar(at) for name, bar in self._bars.items()},
-            "links": {name: pair(*ends) for name, ends in self._links},
             "axes": {name: pair(place, way) for name, place, way in self._axes},
         }
 
@@ -112,12 +109,6 @@ class MarkedScene:
             return lambda at: at(name)
         fixed = None if isinstance(side.point, str) else np.array([self._original.location(side)])
         return None if fixed is None else lambda _: fixed
-
-    def _joined_by_lines(self) -> list[tuple[str, list[Callable[[At], Array]]]]:
-        parts = {**self._original.joints, **self._original.loads}
-        lines = {name: part for name, part in parts.items() if isinstance(part, Distance | Spring)}
-        ends = {name: [self._place(part.first), self._place(part.second)] for name, part in lines.items()}
-        return [(name, [end for end in both if end]) for name, both in ends.items() if all(both)]
 
     def _axes_of(self, name: str, joint: Joint) -> list[tuple[str, Callable[[At], Array], Callable[[At], Array]]]:
         """The axes of a joint, each with the body that carries it."""

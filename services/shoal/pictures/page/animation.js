@@ -81,6 +81,7 @@ function animate(figure) {
     }
     for (const path of Object.values(run.markers)) line(path.slice(0, frame + 1).map(to), "#F0B48C", 1.5);
     for (const outline of Object.values(run.behind)) line(outline[frame].map(to), "#A0A0A0", 3);
+    for (const ends of Object.values(run.links)) line(ends[frame].map(to), GREY, 1.5);
     for (const outline of Object.values(run.outlines)) {
       line(outline[frame].map(to), BLUE, 4);
       for (const end of [outline[frame][0], outline[frame].at(-1)]) circle(to(end), 4, BLUE, true);
