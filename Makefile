@@ -58,9 +58,10 @@ kernels: setup
 test: kernels  ## the tests
 	@OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 3 --dist loadfile --no-loadscope-reorder $(ARGS)
 
-lint: setup  ## style and format
+lint: setup  ## style, format and spelling
 	@$(BIN)/ruff check
 	@$(BIN)/ruff format --check
+	@$(BIN)/codespell docs README.md CHANGELOG.md
 
 types: setup  ## static types
 	@$(BIN)/mypy

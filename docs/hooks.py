@@ -7,10 +7,12 @@ import inspect
 import re
 import textwrap
 from collections.abc import Iterator
+from html import unescape
 from types import ModuleType
 from typing import Any, Literal, get_args, get_origin
 
 import click
+from latex2mathml.converter import convert
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
@@ -26,6 +28,16 @@ def on_page_markdown(markdown: str, **_: Any) -> str:
     for mark, generate in marks.items():
         markdown = markdown.replace(mark, generate()) if mark in markdown else markdown
     return markdown
+
+
+def on_page_content(html: str, **_: Any) -> str:
+    """Set formulas as MathML, which browsers draw without a script or a font from elsewhere."""
+
+    def formula(found: re.Match[str]) -> str:
+        display = "block" if found["tag"] == "div" else "inline"
+        return str(convert(unescape(found["tex"]), display=display))
+
+    return re.sub(r'<(?P<tag>span|div) class="arithmatex">\\[(\[](?P<tex>.*?)\\[)\]]</(?P=tag)>', formula, html, flags=re.DOTALL)
 
 
 def findings() -> str:
