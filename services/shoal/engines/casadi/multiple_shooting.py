@@ -64,7 +64,7 @@ def identify_by_segments(
     values = np.clip(solution["x"].full().ravel()[: len(paths)], low, high)
     fitness = float(np.sum((whole(values).full() - target.T) ** 2) / len(target))
     # The first guess runs all segments once for each of them but the first; the fitness is one more.
-    return result(values, fitness, optimise.stats(), "ipopt", nlp.segments, nlp.size, wall, built - began)
+    return result(values, fitness, optimise.stats(), "ipopt", nlp.segments, nlp.size, wall)
 
 
 @dataclass(frozen=True, eq=False)

@@ -51,20 +51,16 @@ class ShootingResult:
 
     values: the identified values in the order of the paths [rad or rad/s], (parameters,)
     fitness: mean over the samples of |r - r_measured|^2 at `values` [m^2]
-    forward_evaluations: simulations alone; gradient_evaluations: simulations with all first derivatives
     evaluations: forward simulation equivalents; a derivative is one more simulation per parameter
-    wall_s: time of the optimisation; build_s: time to derive the model and its derivatives [s]
+    wall_s: time of the optimisation, without that to derive the model and its derivatives [s]
     status, message: `ok` when the optimiser converged, else its own status
     """
 
     values: Array
     fitness: float
     evaluations: int
-    forward_evaluations: int
-    gradient_evaluations: int
     iterations: int
     wall_s: float
-    build_s: float
     status: Status
     message: str
 
@@ -106,7 +102,7 @@ def identify_initial_angles(
     with interruptible():
         values = optimise(x0=first, lbx=low, ubx=high)["x"].full().ravel()
     wall = time.perf_counter() - built
-    return result(values, float(fitness_at(values)), optimise.stats(), solver, 1, len(paths), wall, built - began)
+    return result(values, float(fitness_at(values)), optimise.stats(), solver, 1, len(paths), wall)
 
 
 def result(
@@ -117,7 +113,6 @@ def result(
     more: int,
     directions: int,
     wall_s: float,
-    build_s: float,
 ) -> ShootingResult:
     """Make the result from the optimiser's statistics. more: further simulations; directions: of a derivative."""
     forward = more + _calls(stats, "nlp_f", "nlp_fg", "nlp_g")
@@ -127,11 +122,8 @@ def result(
         values=values,
         fitness=fitness,
         evaluations=forward + (1 + directions) * gradient,
-        forward_evaluations=forward,
-        gradient_evaluations=gradient,
         iterations=int(stats["iter_count"]),
         wall_s=wall_s,
-        build_s=build_s,
         status=Status.OK if trusted else Status.FAILED,
         message="" if trusted else f"{solver}: {stats['return_status']}",
     )

@@ -21,10 +21,7 @@ from shoal.engines.tree.vector3 import (
     Symmetric,
     Vector,
     add,
-    add_scaled,
     congruence,
-    cross,
-    dot,
     inverse,
     matrix,
     multiply,
@@ -33,11 +30,10 @@ from shoal.engines.tree.vector3 import (
     put,
     put_matrix,
     put_symmetric,
-    scale,
-    subtract,
     symmetric,
     vector,
 )
+from shoal.mechanics.numerics.tuples import dot, minus, plus, times, wedge
 
 
 @njit(**OPTIONS)
@@ -57,20 +53,20 @@ def gather(tree: Tree, w: Room) -> None:
     for i in range(1, tree.parents.size):
         turn, mass = matrix(w.rotation, i), tree.mass[i]
         omega = vector(w.turning, i)
-        x, y, z = moment = scale(mass, multiply(turn, vector(tree.lever, i)))
+        x, y, z = moment = times(mass, multiply(turn, vector(tree.lever, i)))
         inertia = congruence(turn, symmetric(tree.inertia, i))
         put_symmetric(w.A, i, inertia)
         put_matrix(w.B, i, (0.0, -z, y, z, 0.0, -x, -y, x, 0.0))
         put_symmetric(w.C, i, (mass, 0.0, 0.0, mass, 0.0, mass))
-        put(w.torque, i, cross(omega, multiply_symmetric(inertia, omega)))
-        put(w.force, i, cross(omega, cross(omega, moment)))
+        put(w.torque, i, wedge(omega, multiply_symmetric(inertia, omega)))
+        put(w.force, i, wedge(omega, wedge(omega, moment)))
     for n in range(tree.load_body.size):
         i = tree.load_body[n]
         force = vector(tree.load_force, n)
         place = multiply(matrix(w.rotation, i), vector(tree.load_place, n))
-        torque = add(vector(tree.load_torque, n), cross(place, force))
-        put(w.torque, i, subtract(vector(w.torque, i), torque))
-        put(w.force, i, subtract(vector(w.force, i), force))
+        torque = add(vector(tree.load_torque, n), wedge(place, force))
+        put(w.torque, i, minus(vector(w.torque, i), torque))
+        put(w.force, i, minus(vector(w.force, i), force))
 
 
 @njit(**OPTIONS)
@@ -84,7 +80,7 @@ def reduce(tree: Tree, w: Room, v: Array) -> None:
         if kind == SPHERICAL:
             # D = [1; 0] in the fixed axes; afterwards the parent meets neither A nor B.
             own = inverse(A)
-            rest = scale(-1.0, multiply_symmetric(own, torque))
+            rest = times(-1.0, multiply_symmetric(own, torque))
             put_symmetric(w.turn_share, i, own)
             put_matrix(w.speed_share, i, B)
             put(w.rest, i, rest)
@@ -106,9 +102,9 @@ def reduce(tree: Tree, w: Room, v: Array) -> None:
                 rest = -share * (tree.damping[k] * v[k] + along)
                 A, C = minus_square(A, share, upper), minus_square(C, share, lower)
                 B = minus_outer(B, share, upper, lower)
-                torque, force = add_scaled(torque, rest, upper), add_scaled(force, rest, lower)
-                put(w.turn_share, i, scale(share, upper))
-                put(w.speed_share, i, scale(share, lower))
+                torque, force = plus(torque, rest, upper), plus(force, rest, lower)
+                put(w.turn_share, i, times(share, upper))
+                put(w.speed_share, i, times(share, lower))
                 w.rest[i, 0] = rest
             torque = add(torque, add(multiply_symmetric(A, turn_bias), multiply(B, speed_bias)))
             force = add(force, add(multiply_transposed(B, turn_bias), multiply_symmetric(C, speed_bias)))
@@ -138,7 +134,7 @@ def hand_over(
         w.B[parent, k] += K[k]
     for k in range(6):
         w.C[parent, k] += C[k]
-    put(w.torque, parent, add(vector(w.torque, parent), add(torque, cross(arm, force))))
+    put(w.torque, parent, add(vector(w.torque, parent), add(torque, wedge(arm, force))))
     put(w.force, parent, add(vector(w.force, parent), force))
 
 
@@ -148,18 +144,18 @@ def expand(tree: Tree, w: Room, out: Array) -> None:
     for i in range(1, tree.parents.size):
         parent, kind, k = tree.parents[i], tree.kinds[i], tree.first_v[i]
         epsilon = vector(w.turning_rate, parent)
-        a = add(vector(w.speed_rate, parent), add(cross(epsilon, vector(w.arm, i)), vector(w.speed_bias, i)))
+        a = add(vector(w.speed_rate, parent), add(wedge(epsilon, vector(w.arm, i)), vector(w.speed_bias, i)))
         epsilon = add(epsilon, vector(w.turn_bias, i))
         if kind in (REVOLUTE, PRISMATIC):
             out[k] = w.rest[i, 0] - dot(vector(w.turn_share, i), epsilon) - dot(vector(w.speed_share, i), a)
             if kind == REVOLUTE:
-                epsilon = add_scaled(epsilon, out[k], third_axis(w, i))
+                epsilon = plus(epsilon, out[k], third_axis(w, i))
             else:
-                a = add_scaled(a, out[k], third_axis(w, i))
+                a = plus(a, out[k], third_axis(w, i))
         elif kind == SPHERICAL:
             pull = multiply(matrix(w.speed_share, i), a)
-            total = subtract(vector(w.rest, i), multiply_symmetric(symmetric(w.turn_share, i), pull))
-            relative = multiply_transposed(matrix(w.rotation, i), subtract(total, epsilon))
+            total = minus(vector(w.rest, i), multiply_symmetric(symmetric(w.turn_share, i), pull))
+            relative = multiply_transposed(matrix(w.rotation, i), minus(total, epsilon))
             out[k], out[k + 1], out[k + 2] = relative
             epsilon = total
         put(w.turning_rate, i, epsilon)

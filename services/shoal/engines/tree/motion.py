@@ -16,9 +16,6 @@ from shoal.engines.tree.vector3 import (
     Matrix,
     Vector,
     add,
-    add_scaled,
-    cross,
-    dot,
     from_quaternion,
     matrix,
     multiply,
@@ -27,10 +24,10 @@ from shoal.engines.tree.vector3 import (
     product,
     put,
     put_matrix,
-    scale,
     symmetric,
     vector,
 )
+from shoal.mechanics.numerics.tuples import dot, plus, times, wedge
 
 
 @njit(**OPTIONS)
@@ -63,22 +60,22 @@ def move(tree: Tree, w: Room, q: Array, v: Array) -> None:
         spin, slide = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)  # D_j qdot_j
         if kind == REVOLUTE:
             turn = turn_about_third(turn, q[first])
-            spin = scale(v[k], (turn[2], turn[5], turn[8]))
+            spin = times(v[k], (turn[2], turn[5], turn[8]))
         elif kind == PRISMATIC:
             axis = (turn[2], turn[5], turn[8])
-            arm = add_scaled(arm, q[first], axis)
-            slide = scale(v[k], axis)
+            arm = plus(arm, q[first], axis)
+            slide = times(v[k], axis)
         elif kind == SPHERICAL:
             turn = product(turn, from_quaternion(q[first], q[first + 1], q[first + 2], q[first + 3]))
             spin = multiply(turn, (v[k], v[k + 1], v[k + 2]))
-        swing = cross(omega, arm)
+        swing = wedge(omega, arm)
         put_matrix(w.rotation, i, turn)
         put(w.arm, i, arm)
         put(w.position, i, add(vector(w.position, parent), arm))
         put(w.turning, i, add(omega, spin))
         put(w.speed, i, add(add(vector(w.speed, parent), swing), slide))
-        put(w.turn_bias, i, cross(omega, spin))
-        put(w.speed_bias, i, cross(omega, add_scaled(swing, 2.0, slide)))
+        put(w.turn_bias, i, wedge(omega, spin))
+        put(w.speed_bias, i, wedge(omega, plus(swing, 2.0, slide)))
 
 
 @njit(**OPTIONS)
@@ -92,7 +89,7 @@ def energies(tree: Tree, w: Room) -> tuple[float, float]:
         lever = multiply(turn, vector(tree.lever, i))
         own = multiply_transposed(turn, omega)
         kinetic += 0.5 * dot(own, multiply_symmetric(symmetric(tree.inertia, i), own))
-        kinetic += mass * (0.5 * dot(speed, speed) + dot(speed, cross(omega, lever)))
+        kinetic += mass * (0.5 * dot(speed, speed) + dot(speed, wedge(omega, lever)))
         potential -= mass * dot(gravity, add(vector(w.position, i), lever))
     return kinetic, potential
 
@@ -107,7 +104,7 @@ def power(tree: Tree, w: Room, v: Array) -> float:
         i = tree.load_body[n]
         omega = vector(w.turning, i)
         place = multiply(matrix(w.rotation, i), vector(tree.load_place, n))
-        total += dot(vector(tree.load_force, n), add(vector(w.speed, i), cross(omega, place)))
+        total += dot(vector(tree.load_force, n), add(vector(w.speed, i), wedge(omega, place)))
         total += dot(vector(tree.load_torque, n), omega)
     return total
 

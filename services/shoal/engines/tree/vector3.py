@@ -1,6 +1,7 @@
 """Vectors and matrices of three dimensions as tuples of scalars, which compiled code keeps in registers.
 
-A vector is (x, y, z); a matrix nine numbers, row by row; a symmetric matrix (xx, xy, xz, yy, yz, zz).
+Multiples and products of vectors are those of `tuples`. A vector is (x, y, z); a matrix nine numbers, row by row; a
+symmetric matrix (xx, xy, xz, yy, yz, zz).
 """
 
 from __future__ import annotations
@@ -57,36 +58,6 @@ def put_symmetric(a: Any, i: int, s: Symmetric) -> None:
 def add(a: Vector, b: Vector) -> Vector:
     """a + b."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
-
-
-@njit(**OPTIONS)
-def subtract(a: Vector, b: Vector) -> Vector:
-    """a - b."""
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
-
-
-@njit(**OPTIONS)
-def scale(factor: float, a: Vector) -> Vector:
-    """factor a."""
-    return factor * a[0], factor * a[1], factor * a[2]
-
-
-@njit(**OPTIONS)
-def add_scaled(a: Vector, factor: float, b: Vector) -> Vector:
-    """a + factor b."""
-    return a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2]
-
-
-@njit(**OPTIONS)
-def dot(a: Vector, b: Vector) -> float:
-    """a . b."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@njit(**OPTIONS)
-def cross(a: Vector, b: Vector) -> Vector:
-    """a x b."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @njit(**OPTIONS)
