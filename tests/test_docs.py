@@ -140,10 +140,19 @@ def test_the_servers_of_the_tutorial_are_started_as_it_says(tutorial: str) -> No
     assert f"<http://127.0.0.1:{processes.port('prefect')}>" in tutorial
 
 
-NEW = re.compile(r"`((?:mechanics|engines|swarm|identification)/\S+\.py)`:$", re.MULTILINE)
+NEW = re.compile(r"`((?:mechanics|engines|swarm|identification|response)/\S+\.py)`:$", re.MULTILINE)
 CHANGED = re.compile(r"^\+\+\+ b/services/shoal/(\S+)$", re.MULTILINE)
-FILES = {"element": 3, "joint": 2, "condition": 2, "load": 2, "integrator": 3, "engine": 2, "optimiser": 4}
-"""How many files a new kind touches, by its page; the last one has a method and a swarm."""
+FILES = {
+    "element": 3,
+    "joint": 2,
+    "condition": 2,
+    "load": 2,
+    "integrator": 3,
+    "engine": 2,
+    "optimiser": 4,
+    "surrogate": 5,
+}
+"""How many files a new kind touches, by its page; the last two have more than one kind."""
 HELD = {
     "heun": ["tests/mechanics/test_integrators.py"],
     "cross-entropy": ["tests/swarm/test_contract.py"],
@@ -272,6 +281,20 @@ def test_engine_of_its_page_agrees_with_ours(tmp_path: Path) -> None:
     assert max(*largest, estimated) < 1e-8
     assert kind == "joints.S: engine pendulum cannot do slider; use gauss or exudyn or exudyn-ge"
     assert own.endswith("engine pendulum takes one body on one joint, and markers on the body")
+
+
+def test_surrogate_sampler_and_reliability_method_of_their_page_agree_with_ours(tmp_path: Path) -> None:
+    program = (
+        "[[[of.bounds.lower.tolist(), of.bounds.upper.tolist(), of.bounds.gap, of.why] for of in (spline, auto)], "
+        "[[*of.limits[0].interval, of.evaluations, of.limits[0].passing.why] for of in (stratified, plain)]]"
+    )
+    (ours, theirs), chances = used("extend/surrogate.md", "response", tmp_path, program)
+    np.testing.assert_allclose(ours[:2], theirs[:2], atol=1e-5)
+    assert ours[2] < 1e-2
+    assert ours[3].startswith("cubic splines on a grid of 7 points")
+    (low, high, runs, why), (least, most, *_) = chances
+    assert max(low, least) < min(high, most)
+    assert (runs, why) == (256, "1000 runs of a Latin hypercube")
 
 
 @pytest.mark.slow  # A swarm takes thousands of runs.

@@ -11,8 +11,8 @@ from shoal.response import respond
 from shoal.response.inputs import Inputs, UncertainParameter
 from shoal.response.marginals import Interval, Normal
 from shoal.response.methods import get_method
-from shoal.response.methods.chebyshev_sparse import sparse_grid
 from shoal.response.methods.maximum_entropy import entropic_quantiles
+from shoal.response.methods.polynomial_fits import sparse_grid
 from shoal.response.runs import Answers, CachedModel
 from shoal.response.statistics import QUANTILES
 from shoal.response.study import Found, Study

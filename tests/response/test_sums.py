@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from scipy import fft, optimize, stats
 from shoal.response.inputs import Inputs, UncertainParameter
-from shoal.response.limits.choice import Passing, probability
+from shoal.response.limits.choice import probability
+from shoal.response.limits.exceedance import Exceedance
 from shoal.response.limits.margins import Margins
 from shoal.response.marginals import Normal
 from shoal.response.runs import Answers
@@ -41,7 +42,7 @@ class Sum:
         # Middles of k cells whose numbers add up to i are at i + k / 2, the bound half a cell beyond the last one.
         return float(1 - below[: CELLS - len(self.means) + 1].sum())
 
-    def asked(self, seed: int) -> Passing:
+    def asked(self, seed: int) -> Exceedance:
         """By `auto`, with values as the parameters and with their logarithms."""
         names = [f"x{k}" for k in range(len(self.means))]
         logarithmic = seed % 2 == 0

@@ -8,14 +8,14 @@ from matplotlib.figure import Figure
 from shoal.pictures.instants import FEW, band, curve, time_axis
 from shoal.pictures.numbers import looked_at
 from shoal.pictures.style import BLUE, VERMILION, canvas, headline, log_ticks, styled
-from shoal.response.limits import Judged
+from shoal.response.limits import LimitResult
 
 RARE = 0.1
 """Below this probability the axis is logarithmic."""
 
 
 @styled
-def probability(found: Judged) -> Figure:
+def probability(found: LimitResult) -> Figure:
     """The first passage with its interval, on a logarithmic axis if it is rare; found: of random parameters.
 
     Beside intervals, the least and the largest.

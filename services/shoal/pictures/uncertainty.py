@@ -21,7 +21,7 @@ from shoal.pictures.pages import animation, render, software
 from shoal.pictures.probability import probability
 from shoal.pictures.response import response
 from shoal.response import Response
-from shoal.response.limits import Judged
+from shoal.response.limits import LimitResult
 from shoal.response.worst import Worst, worst
 from shoal.trajectory import Array
 
@@ -84,7 +84,7 @@ def _parameters(found: Response) -> list[list[str]]:
     return [[one.name, one.marginal.text or "a distribution"] for one in found.inputs.parameters]
 
 
-def _limit(one: Judged) -> list[str]:
+def _limit(one: LimitResult) -> list[str]:
     shown = one.shown
     how = "–" if shown is None else ", ".join(f"{name} = {value:.5g}" for name, value in shown.parameters.items())
     if one.between is not None:
@@ -159,7 +159,7 @@ def _pictures(found: Response) -> list[Drawn]:
     return drawn
 
 
-def _passage(one: Judged) -> Drawn:
+def _passage(one: LimitResult) -> Drawn:
     event = one.limit.event.removeprefix("is ")
     words = f"The probability that the {one.limit.stated} has been {event} at an instant looked at, by each of them."
     return Drawn(f"passage-{one.limit.text}", probability(one), words, f"{words[:-1]}: {one.limit.title}.")

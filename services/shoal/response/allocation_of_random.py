@@ -30,14 +30,14 @@ from shoal.response import findings as kinds
 from shoal.response.allocation import MANY, ROUNDS, SETTLED, STEP, TIGHTEST, Allocation, passed, with_factors
 from shoal.response.between import GAP, MORE, PLACES, between
 from shoal.response.inputs import Inputs
-from shoal.response.limits import MOST, Judged, Limit
+from shoal.response.limits import MOST, Limit, LimitResult
 from shoal.response.limits.choice import probability
 from shoal.response.limits.estimate import ExceedanceEstimate
 from shoal.response.limits.form import design_points
 from shoal.response.limits.inverse import Nearest, nearest
 from shoal.response.limits.judge import watched
-from shoal.response.limits.judged import undecided
 from shoal.response.limits.margins import FAR, Margins, least
+from shoal.response.limits.result import undecided
 from shoal.response.machine import ResponseModel
 from shoal.response.respond import respond
 from shoal.response.runs import Answers
@@ -169,7 +169,7 @@ def of_random(
     limit: Limit,
     machine: ResponseModel,
     inputs: Inputs,
-    stated: Judged,
+    stated: LimitResult,
     target: float,
     costs: Array,
     widest: Array,

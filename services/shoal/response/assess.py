@@ -17,8 +17,8 @@ from shoal.response.inputs import Inputs
 from shoal.response.kept import TimeIsUpError
 from shoal.response.limits.crosschecked import allowing, crosschecked
 from shoal.response.limits.judge import Reach, judge, watched
-from shoal.response.limits.judged import Judged
 from shoal.response.limits.limit import Limit
+from shoal.response.limits.result import LimitResult
 from shoal.response.problem import UncertainProblem
 from shoal.response.respond import ModelResponse, respond
 from shoal.response.runs import Model
@@ -29,16 +29,16 @@ UNRESOLVED = 1e-8
 """Runs that differ by less than this share of a limit's quantity differ by the errors of their steps."""
 
 
-def assess_limits(problem: UncertainProblem, found: ModelResponse) -> list[Judged]:
+def assess_limits(problem: UncertainProblem, found: ModelResponse) -> list[LimitResult]:
     """Return the results of the limits for which there is time. Raises InputError, ComputationError."""
-    results = list[Judged]()
+    results = list[LimitResult]()
     with suppress(TimeIsUpError):
         for one in problem.limits:
             results.append(_assess(one, problem, found))
     return results
 
 
-def _assess(limit: Limit, problem: UncertainProblem, found: ModelResponse) -> Judged:
+def _assess(limit: Limit, problem: UncertainProblem, found: ModelResponse) -> LimitResult:
     model, inputs = problem.model, problem.inputs
     if inputs.mixed:
         return between(limit, model, inputs, **_how(problem))
@@ -74,7 +74,7 @@ def _reach(problem: UncertainProblem, inputs: Inputs, gap: float | None) -> Reac
     return reach
 
 
-def allocate(problem: UncertainProblem, results: Sequence[Judged]) -> Allocation | None:
+def allocate(problem: UncertainProblem, results: Sequence[LimitResult]) -> Allocation | None:
     """Return the cheapest tolerances that keep the limit, where they are asked for and there is time.
 
     Raises InputError, ComputationError.
@@ -85,7 +85,7 @@ def allocate(problem: UncertainProblem, results: Sequence[Judged]) -> Allocation
     return None
 
 
-def _allocated(problem: UncertainProblem, stated: Judged) -> Allocation:
+def _allocated(problem: UncertainProblem, stated: LimitResult) -> Allocation:
     """Stated: the result with the stated tolerances."""
     limit, model, inputs, asked = stated.limit, problem.model, problem.inputs, problem.asked
     prices, widest = costs_of(asked.cost or {}, inputs), accepted(model.scene, inputs)
@@ -104,7 +104,7 @@ def _allocated(problem: UncertainProblem, stated: Judged) -> Allocation:
 
 
 def allow_for_limits(
-    problem: UncertainProblem, statistics: Statistics | None, results: Sequence[Judged]
+    problem: UncertainProblem, statistics: Statistics | None, results: Sequence[LimitResult]
 ) -> tuple[Statistics | None, list[Finding]]:
     """Return statistics whose errors allow for the probabilities of limits, and what they have missed."""
     missed = list[Finding]()

@@ -16,11 +16,11 @@ from scipy import special
 from shoal.response.enclosure import enclosure
 from shoal.response.extremes import extremes
 from shoal.response.inputs import Inputs
-from shoal.response.limits import Judged, Limit, Shown, judge
+from shoal.response.limits import Limit, LimitResult, VerifiedRun, judge
 from shoal.response.limits.choice import probability
 from shoal.response.limits.judge import watched
-from shoal.response.limits.judged import Between
 from shoal.response.limits.margins import FAR, Margins
+from shoal.response.limits.result import ProbabilityBounds
 from shoal.response.machine import ResponseModel
 from shoal.response.methods.nested import best
 from shoal.response.respond import ModelResponse, respond
@@ -48,7 +48,7 @@ def between(
     seed: int,
     verify: bool,
     progress: Callable[[int], None] | None,
-) -> Judged:
+) -> LimitResult:
     """The least and the largest probability, with the interval values there. Raises InputError, ComputationError."""
     given, random = inputs.some(~inputs.random), inputs.some(inputs.random)
     few = min(most, max(LEAST, most // SHARE))
@@ -65,8 +65,8 @@ def between(
         ends.append((one, dict(zip(given.names, named.tolist(), strict=True)), values))
     (lower, at_lower, _), (upper, at_upper, there) = ends
     beyond = _beyond(answer.runs, seed)
-    found = Between(lower, upper, at_lower, at_upper, beyond, answer.runs.evaluations)
-    return Judged(
+    found = ProbabilityBounds(lower, upper, at_lower, at_upper, beyond, answer.runs.evaluations)
+    return LimitResult(
         *(limit, way, inputs, machine.times, None, None, float("nan"), float("nan")),
         *(_with(upper.shown, at_upper, there), made, failed, upper.reason or lower.reason, found),
     )
@@ -126,7 +126,7 @@ def _on(progress: Callable[[int], None] | None, made: int) -> Callable[[int], No
     return None if progress is None else lambda runs: progress(made + runs)
 
 
-def _with(shown: Shown | None, named: dict[str, float], values: dict[str, float]) -> Shown | None:
+def _with(shown: VerifiedRun | None, named: dict[str, float], values: dict[str, float]) -> VerifiedRun | None:
     """A run with the values of the intervals as well."""
     if shown is None:
         return None

@@ -18,7 +18,7 @@ from shoal.response.control import unseen
 from shoal.response.findings import ResponseStatus, status_of
 from shoal.response.finer import Finer
 from shoal.response.inputs import Inputs
-from shoal.response.limits import Judged
+from shoal.response.limits import LimitResult
 from shoal.response.marginals import Interval
 from shoal.response.statistics import QUANTILES, Statistics
 from shoal.scene import Scene
@@ -90,7 +90,7 @@ class Response:
     model: Array
     stated: Scene
     engine: str
-    limits: tuple[Judged, ...] = ()
+    limits: tuple[LimitResult, ...] = ()
     allocation: Allocation | None = None
     boxes: Boxes | None = None
     finer: Finer | None = None

@@ -11,7 +11,7 @@ import numpy as np
 from shoal.engines import get_engine
 from shoal.errors import InputError
 from shoal.response.inputs import UncertainParameter
-from shoal.response.limits import Shown
+from shoal.response.limits import VerifiedRun
 from shoal.response.limits.judge import show
 from shoal.response.limits.limit import Limit
 from shoal.response.machine import quantities
@@ -29,7 +29,7 @@ class Worst:
 
     of: str
     scene: Scene
-    shown: Shown
+    shown: VerifiedRun
 
     def save(self, path: Path) -> None:
         """As YAML. Raises ComputationError."""
@@ -84,7 +84,7 @@ def _no_case(of: str, limits: Iterable[str], scene: Scene) -> InputError:
     )
 
 
-def _case(found: Response, of: str, shown: Shown) -> Worst:
+def _case(found: Response, of: str, shown: VerifiedRun) -> Worst:
     if shown.status != "ok":
         raise InputError(f"worst: the run of {of} is not borne out: {shown.message}")
     scene = found.stated.with_values(shown.values)
@@ -106,7 +106,7 @@ def _widest(found: Response) -> str:
     return f"{marker}.{quantity}.lower"
 
 
-def _bound(found: Response, of: str) -> tuple[str, Shown]:
+def _bound(found: Response, of: str) -> tuple[str, VerifiedRun]:
     """The run that attains a bound, where that lies farthest out."""
     marker, rest, side = _parts(of)
     if found.bounds is None or side not in SIDES or marker not in found.markers or rest not in found.quantities:
@@ -119,4 +119,4 @@ def _bound(found: Response, of: str) -> tuple[str, Shown]:
     passed = Limit(of, marker, rest, above, 0.0)
     shown = show(passed, found.stated, found.times, get_engine(found.engine), found.inputs, arguments[instant])
     value = -shown.margin if above else shown.margin
-    return of, Shown(**{**vars(shown), "margin": value})
+    return of, VerifiedRun(**{**vars(shown), "margin": value})

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from shoal.response import findings as kinds
 from shoal.response.kept import TimeIsUpError
 from shoal.response.limits.counted import contradictions
 from shoal.response.limits.estimate import ExceedanceEstimate
+from shoal.response.limits.exceedance import Exceedance, coarse
 from shoal.response.limits.form import APART, SHARES, DesignPoint, design_points, distinct
 from shoal.response.limits.importance import Sample, adapted, controlled, sample
 from shoal.response.limits.margins import Margins, least
@@ -56,37 +57,13 @@ LEAST = 0.3
 """Coefficient of variation that subset simulation has at least."""
 FOR_POINTS, MORE_POINTS = 0.1, 0.2
 """Share of the runs that confirm design points, twice; and that look for them where a response surface is no help."""
-COARSE = 0.15
-"""Coefficient of variation above which the estimate is told to be coarse."""
 PLAIN = 0.1
 """Share of the runs that are drawn from the distributions: design points are where a search looks, these are not."""
 DISAGREE = 4.0
 """Standard deviations by which two independent estimates may differ and it still be chance."""
 
 
-@dataclass(frozen=True)
-class Passing:
-    """The answer of a method. findings: why it is in doubt; plain: runs that were drawn from the distributions to see
-    whether they contradict it; sample: runs by which it can be counted how probable the
-    limit would be if it were elsewhere, None where there are none
-    """
-
-    estimate: ExceedanceEstimate
-    points: list[DesignPoint]
-    why: str
-    findings: list[Finding] = field(default_factory=list)
-    plain: int = 0
-    sample: Sample | None = None
-
-    @property
-    def shown(self) -> Array | None:
-        """Place of the run that shows how the limit is passed, or comes nearest to it, (parameters,)."""
-        if self.points or self.sample is None:
-            return self.points[0].place if self.points else None
-        return np.asarray(self.sample.places[least(self.sample.rows).argmin()])
-
-
-def form(margins: Margins, seed: int) -> Passing:
+def form(margins: Margins, seed: int) -> Exceedance:
     """The half space beyond the tangent at the nearest design point, without an interval: its error is not known."""
     parameters = len(margins.inputs)
     directions = np.random.default_rng(seed).standard_normal((STARTS, parameters))
@@ -94,7 +71,7 @@ def form(margins: Margins, seed: int) -> Passing:
     points = design_points(margins, np.vstack([np.zeros((1, parameters)), directions]))
     if not points:
         none = kinds.NO_DESIGN_POINT.found("FORM found no place where the limit is exceeded")
-        return Passing(_nothing("no design point"), [], "FORM", [none])
+        return Exceedance(_nothing("no design point"), [], "FORM", [none])
     instants = margins(np.zeros((1, parameters))).shape[1]
     passed = np.where(np.arange(instants) >= points[0].instant, points[0].probability, 0.0)
     found = [] if points[0].converged else [kinds.FORM_NOT_CONVERGED.found("FORM did not converge")]
@@ -102,39 +79,39 @@ def form(margins: Margins, seed: int) -> Passing:
         text = f"{len(points)} design points were found and FORM takes the nearest only"
         found.append(kinds.SEVERAL_DESIGN_POINTS.found(text, points=len(points)))
     estimate = ExceedanceEstimate(passed, np.full(instants, np.nan), "FORM")
-    return Passing(estimate, points, "FORM: first-order estimate", found)
+    return Exceedance(estimate, points, "FORM: first-order estimate", found)
 
 
-def by_importance(margins: Margins, seed: int) -> Passing:
+def by_importance(margins: Margins, seed: int) -> Exceedance:
     """Runs around the design points that FORM finds."""
     points = form(margins, seed).points
     if not points:
         none = kinds.NO_DESIGN_POINT.found("no design point was found to sample at")
-        return Passing(_nothing("no design point"), [], "importance sampling", [none])
+        return Exceedance(_nothing("no design point"), [], "importance sampling", [none])
     found = sample(margins, adapted(points, []), margins.left, seed + 1)
     why = f"{found.estimate.why} around {_told(points)}"
-    return Passing(found.estimate, points, why, _weak(found.estimate, [found], points, ended=True), sample=found)
+    return Exceedance(found.estimate, points, why, _weak(found.estimate, [found], points, ended=True), sample=found)
 
 
-def by_subset(margins: Margins, seed: int) -> Passing:
+def by_subset(margins: Margins, seed: int) -> Exceedance:
     """All runs in levels."""
     # About one level for every power of ten down to a millionth.
     found = subset(margins, max(margins.left // 7, 20), seed)
-    return Passing(
-        found.estimate, _seen(found.places), found.estimate.why, _coarse(found.estimate), sample=found.sample
+    return Exceedance(
+        found.estimate, _seen(found.places), found.estimate.why, coarse(found.estimate), sample=found.sample
     )
 
 
-def monte_carlo(margins: Margins, seed: int) -> Passing:
+def monte_carlo(margins: Margins, seed: int) -> Exceedance:
     """All runs drawn from the distributions."""
     count = margins.left
     places = np.random.default_rng(seed).standard_normal((count, len(margins.inputs)))
     drawn = Sample(places, margins(places), np.ones(count))
     estimate = replace(drawn.estimate, why=f"{count} random runs")
-    return Passing(estimate, _seen(drawn.beyond.places), estimate.why, _coarse(estimate), sample=drawn)
+    return Exceedance(estimate, _seen(drawn.beyond.places), estimate.why, coarse(estimate), sample=drawn)
 
 
-def auto(margins: Margins, seed: int) -> Passing:
+def auto(margins: Margins, seed: int) -> Exceedance:
     """Importance sampling, whose proposals and control variate are found on a response surface of the runs before.
 
     Where the limit is passed often, plain sampling is as good.
@@ -152,7 +129,7 @@ def auto(margins: Margins, seed: int) -> Passing:
     rows = margins(plain)
     searched = _search(margins, pilot, [], seed + 10)
     if not searched.points:
-        return Passing(rough, [], rough.why, contradictions(rough, rows), len(rows), pilot.sample)
+        return Exceedance(rough, [], rough.why, contradictions(rough, rows), len(rows), pilot.sample)
     first = sample(margins, adapted(searched.proposed, searched.beyond), int(FIRST * margins.left), seed + 2)
     searched = _search(margins, pilot, searched.points, seed + 20)
     proposal = adapted(searched.proposed, [*searched.beyond, first], first)
@@ -168,7 +145,7 @@ def auto(margins: Margins, seed: int) -> Passing:
         *_disagree(estimate, "importance sampling", rough, LEAST, "subset simulation"),
     ]
     why = f"{estimate.why} around {_told(searched.points)}; {rough.why} says {rough.probability:.1e}"
-    return Passing(estimate, searched.points, why, findings, len(rows), last)
+    return Exceedance(estimate, searched.points, why, findings, len(rows), last)
 
 
 @dataclass(frozen=True)
@@ -242,7 +219,7 @@ def _fresh(points: list[DesignPoint], known: list[DesignPoint], parameters: int)
     return np.array(fresh).reshape(-1, parameters)
 
 
-WAYS: dict[str, Callable[[Margins, int], Passing]] = {
+WAYS: dict[str, Callable[[Margins, int], Exceedance]] = {
     "auto": auto,
     "form": form,
     "importance": by_importance,
@@ -252,14 +229,14 @@ WAYS: dict[str, Callable[[Margins, int], Passing]] = {
 """The list."""
 
 
-def get_way(name: str) -> Callable[[Margins, int], Passing]:
+def get_way(name: str) -> Callable[[Margins, int], Exceedance]:
     """The way of that name. Raises InputError."""
     if name not in WAYS:
         raise InputError(f"limit-method: no way {name!r}; there are {', '.join(WAYS)}")
     return WAYS[name]
 
 
-def probability(margins: Margins, way: str, seed: int) -> Passing:
+def probability(margins: Margins, way: str, seed: int) -> Exceedance:
     """Raises InputError, also where there are too few runs."""
     try:
         return get_way(way)(margins, seed)
@@ -317,7 +294,7 @@ def _weak(
     if not ended and len(points) >= SEVERAL and seen < SEEN:
         text = f"there may be more design points than the {len(points)} that were found"
         found.append(kinds.DESIGN_POINTS_MISSED.found(text, points=len(points)))
-    return [*found, *_coarse(estimate)]
+    return [*found, *coarse(estimate)]
 
 
 def _disagree(
@@ -335,11 +312,3 @@ def _disagree(
         return []
     text = f"{name} says {one.probability:.1e} and {told} {other.probability:.1e}"
     return [kinds.ESTIMATES_DIFFER.found(text, probability=one.probability, other=other.probability)]
-
-
-def _coarse(estimate: ExceedanceEstimate) -> list[Finding]:
-    """Return a finding where the coefficient of variation is large."""
-    if not estimate.probability or estimate.coefficient <= COARSE:
-        return []
-    text = f"the coefficient of variation of the probability is {estimate.coefficient:.2f}"
-    return [kinds.COARSE.found(text, coefficient=estimate.coefficient)]

@@ -15,14 +15,14 @@ from shoal.response import findings as kinds
 from shoal.response.inputs import IntArray
 from shoal.response.limits.counted import contradictions, ends
 from shoal.response.limits.estimate import ExceedanceEstimate
-from shoal.response.limits.judged import Judged
 from shoal.response.limits.limit import Limit
+from shoal.response.limits.result import LimitResult
 from shoal.response.machine import ResponseModel
 from shoal.response.statistics import Statistics
 from shoal.trajectory import Array
 
 
-def crosschecked(judged: Judged, machine: ResponseModel, values: Array, *, shared: bool) -> Judged:
+def crosschecked(judged: LimitResult, machine: ResponseModel, values: Array, *, shared: bool) -> LimitResult:
     """Test a probability against the runs that estimated mean and standard deviation of the limit's quantity.
 
     values: (runs, columns); shared: whether runs share parameters with others, as those that tell indices do

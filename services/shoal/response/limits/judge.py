@@ -13,10 +13,10 @@ from shoal.engines.verification import run_verified
 from shoal.errors import ComputationError, InputError
 from shoal.response.inputs import Inputs
 from shoal.response.limits.choice import get_way, probability
-from shoal.response.limits.judged import Judged, Shown
 from shoal.response.limits.limit import Limit
 from shoal.response.limits.margin_errors import margin_errors
 from shoal.response.limits.margins import Margins
+from shoal.response.limits.result import LimitResult, VerifiedRun
 from shoal.response.machine import ResponseModel, stable
 from shoal.response.runs import Model
 from shoal.scene import Scene
@@ -64,17 +64,17 @@ def require(machine: ResponseModel, limit: Limit, inputs: Inputs) -> None:
         watched(replace(machine, keep=None), limit)(middle)
 
 
-def _show(limit: Limit, machine: ResponseModel, inputs: Inputs, germ: Array, verify: bool) -> Shown:
+def _show(limit: Limit, machine: ResponseModel, inputs: Inputs, germ: Array, verify: bool) -> VerifiedRun:
     """Run the machine once more at a germ; a run that is refused costs the other answers nothing and is a doubt."""
     named = inputs.named(germ[None])[0]
     try:
         return _run_shown(limit, machine, inputs, named, verify)
     except (InputError, ComputationError) as error:
         values = dict(zip(inputs.names, named.tolist(), strict=True))
-        return Shown(values, inputs.at(named), math.nan, math.nan, "refused", str(error))
+        return VerifiedRun(values, inputs.at(named), math.nan, math.nan, "refused", str(error))
 
 
-def _run_shown(limit: Limit, machine: ResponseModel, inputs: Inputs, named: Array, verify: bool) -> Shown:
+def _run_shown(limit: Limit, machine: ResponseModel, inputs: Inputs, named: Array, verify: bool) -> VerifiedRun:
     """Raises InputError, ComputationError."""
     if verify:
         return show(limit, machine.scene, machine.times, machine.engine, inputs, named)
@@ -95,7 +95,7 @@ def judge(
     seed: int = 0,
     verify: bool = True,
     progress: Callable[[int], None] | None = None,
-) -> Judged:
+) -> LimitResult:
     """By probability where all parameters are random, by bounds of the margin where all are intervals.
 
     Where there are both, see `response.between`. reach: bounds a model; way: one of `WAYS`; most: runs for a
@@ -112,7 +112,7 @@ def judge(
         if passing.sample is not None and shown is not None and shown.errors is not None:
             shifted = passing.sample.shifted(shown.errors.over_time)
         nan, passing = float("nan"), replace(passing, sample=None)  # which takes much room
-        return Judged(
+        return LimitResult(
             *(limit, way, inputs, times, passing, None, nan, nan),
             *(shown, margins.evaluations, margins.failed, margins.why),
             shifted=shifted,
@@ -127,7 +127,7 @@ def judge(
         kept, hidden = None, True
     if verify and shown.status == "ok" and kept is not False and 1 < len(times) < FINER:
         shown = replace(shown, between=_between(limit, machine, shown))
-    return Judged(
+    return LimitResult(
         *(limit, "bounds", inputs, times, None, kept, float(lower[worst]), float((outer - off).min())),
         *(shown, evaluations, failed, ""),
         hidden=hidden,
@@ -139,7 +139,7 @@ def _decided(attained: Array, outer: Array) -> bool | None:
     return False if attained.min() < 0 else True if outer.min() >= 0 else None
 
 
-def _between(limit: Limit, machine: ResponseModel, shown: Shown) -> float | None:
+def _between(limit: Limit, machine: ResponseModel, shown: VerifiedRun) -> float | None:
     """When [s] a run passes a limit first of all instants between those of a machine; None if at none."""
     begin, end = float(machine.times[0]), float(machine.times[-1])
     scene = limit.scene(machine.scene.with_values(shown.values))
@@ -162,7 +162,7 @@ def _between(limit: Limit, machine: ResponseModel, shown: Shown) -> float | None
     return None
 
 
-def show(limit: Limit, scene: Scene, times: Array, engine: Engine, inputs: Inputs, named: Array) -> Shown:
+def show(limit: Limit, scene: Scene, times: Array, engine: Engine, inputs: Inputs, named: Array) -> VerifiedRun:
     """Run a scene once more, with care, with these values of the parameters, (parameters,). Raises InputError."""
     here = limit.scene(scene.with_values(inputs.at(named)))
     able, when = limit.engine(engine, here), limit.instants(times)
@@ -179,10 +179,10 @@ def _shown(
     scene: Scene,
     motion: Trajectory,
     settings: Mapping[str, float],
-) -> Shown:
+) -> VerifiedRun:
     margins = MarginWatch(limit, len(times)).margins(motion, scene, {})[0]
     instant = int(np.argmin(margins))
-    return Shown(
+    return VerifiedRun(
         dict(zip(inputs.names, named.tolist(), strict=True)),
         {**inputs.at(named), **settings},
         float(times[instant]),

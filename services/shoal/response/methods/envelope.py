@@ -1,4 +1,12 @@
-"""A course as slow part, amplitude and phase, each a polynomial of the parameters at every instant."""
+"""Slow part, amplitude and phase of a course, each a polynomial of the parameters at every instant. For comparison.
+
+RS-HT splits by the Hilbert transform (Huang et al., The empirical mode decomposition and the Hilbert spectrum for
+nonlinear and non-stationary time series analysis, Proceedings of the Royal Society A 454, 1998); it errs at both ends
+of the time, where the transform does. RS-LMD splits by local mean decomposition (Smith, The local mean decomposition
+and its application to EEG perception data, Journal of the Royal Society Interface 2, 2005; Jiang and Bai, Interval
+uncertainty quantification for the dynamics of multibody systems combing bivariate Chebyshev polynomials with local mean
+decomposition, Mathematics 10, 2022); it smooths between turning points and is exact for none.
+"""
 
 from __future__ import annotations
 
@@ -47,7 +55,17 @@ def _joined(told: Array) -> Array:
     return np.asarray((told[:, :, 0] + told[:, :, 1] * np.cos(told[:, :, 2])).sum(axis=1))
 
 
-def respond_by_parts(study: Study, method: str, parts: Parts) -> Found:
+def rs_ht(study: Study) -> Found:
+    """Split courses by the Hilbert transform. Raises InputError."""
+    return _by_parts(study, "rs-ht", hilbert_parts)
+
+
+def rs_lmd(study: Study) -> Found:
+    """Split courses by local mean decomposition. Raises InputError."""
+    return _by_parts(study, "rs-lmd", local_mean_parts)
+
+
+def _by_parts(study: Study, method: str, parts: Parts) -> Found:
     """Raises InputError."""
     study.intervals_only(method)
     refuse_without_course(study, method)

@@ -1,4 +1,4 @@
-"""Kriging: a Gaussian process through quasi-random runs, with the length that foretells left-out runs best.
+"""Kriging: a Gaussian process through quasi-random runs, with the length that predicts left-out runs best.
 
 Sacks, Welch, Mitchell and Wynn, Design and analysis of computer experiments, Statistical Science 4, 1989; errors at
 left-out runs by Dubrule, Cross validation of kriging in a unique neighborhood, Mathematical Geology 15, 1983. For
@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from shoal.response.inputs import IntArray
-from shoal.response.study import Found, Study
+from shoal.response.methods.fitted import Plan, star_and_sobol
+from shoal.response.study import Study
 from shoal.trajectory import Array
 
 COUNT = 20
@@ -51,14 +52,14 @@ def _correlation(one: Array, other: Array, length: float) -> Array:
     return np.asarray(np.exp(-0.5 * np.maximum(square, 0.0) / length**2))
 
 
-def kriging(study: Study) -> Found:
-    """A process through `count` runs, the centre and a star. Raises InputError."""
-    study.intervals_only("kriging")
-    parameters = len(study.inputs)
-    count = min(study.count or COUNT * parameters, study.runs.left - 2 * parameters - 1)
-    unit = np.eye(parameters)
-    study.runs(np.vstack([np.zeros((1, parameters)), unit, -unit, study.inputs.sobol(count, study.seed)]))
-    germs, values = study.runs.germs, study.runs.values
+def kriging(study: Study) -> Plan:
+    """Plan `count` runs, the centre and a star, and a process through them."""
+    places = star_and_sobol(study, COUNT)
+    return Plan(places, lambda made: _best(made.runs.germs, made.runs.values), f"kriging through {len(places)} runs")
+
+
+def _best(germs: Array, values: Array) -> Process:
+    """Return the process whose correlation length predicts left-out runs best."""
     middle = values.mean(axis=0)
     best, error = None, np.inf
     for length in LENGTHS:
@@ -67,4 +68,5 @@ def kriging(study: Study) -> Found:
         missed = (weights / np.diag(inverse)[:, None]) ** 2
         if best is None or missed.mean() < error:
             best, error = Process(germs, middle, weights, length, np.sqrt(missed.mean(axis=0))), missed.mean()
-    return Found(f"kriging through {len(germs)} runs", best)
+    assert best is not None
+    return best

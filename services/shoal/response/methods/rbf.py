@@ -8,7 +8,8 @@ import numpy as np
 from scipy.interpolate import RBFInterpolator
 
 from shoal.response.inputs import IntArray
-from shoal.response.study import Found, Study
+from shoal.response.methods.fitted import Plan, star_and_sobol
+from shoal.response.study import Study
 from shoal.trajectory import Array
 
 COUNT = 20
@@ -34,15 +35,12 @@ class Spline:
         return found
 
 
-def rbf(study: Study) -> Found:
-    """A spline through `count` runs and the corners of a star. Raises InputError."""
-    study.intervals_only("rbf")
-    parameters = len(study.inputs)
-    count = min(study.count or COUNT * parameters, study.runs.left - 2 * parameters - 1)
-    unit = np.eye(parameters)
-    study.runs(np.vstack([np.zeros((1, parameters)), unit, -unit, study.inputs.sobol(count, study.seed)]))
-    runs = study.runs
-    return Found(
-        f"a spline of radial basis functions through {len(runs.germs)} runs",
-        Spline(RBFInterpolator(runs.germs, runs.values, kernel="thin_plate_spline")),
-    )
+def rbf(study: Study) -> Plan:
+    """Plan `count` runs, the centre and a star, and a spline through them."""
+    places = star_and_sobol(study, COUNT)
+    about = f"a spline of radial basis functions through {len(places)} runs"
+    return Plan(places, _spline, about)
+
+
+def _spline(study: Study) -> Spline:
+    return Spline(RBFInterpolator(study.runs.germs, study.runs.values, kernel="thin_plate_spline"))

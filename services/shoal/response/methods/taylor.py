@@ -17,8 +17,9 @@ import numpy as np
 from shoal.errors import ComputationError
 from shoal.response.expansion import Expansion, fit
 from shoal.response.inputs import IntArray
+from shoal.response.methods.fitted import Plan
 from shoal.response.polynomials import total_degree
-from shoal.response.study import Found, Study
+from shoal.response.study import Study
 from shoal.trajectory import Array
 
 STEP = 0.05
@@ -56,13 +57,12 @@ def located(germs: Array, cut: int) -> tuple[IntArray, Array]:
     return np.asarray(along @ cut ** np.arange(germs.shape[1])), np.asarray((germs - middle) * cut)
 
 
-def taylor(study: Study) -> Found:
-    """Of order `degree`, 1 or 2, in as many subintervals along each axis as `count` runs allow, else in one.
+def taylor(study: Study) -> Plan:
+    """Plan a series of order `degree`, 1 or 2, in as many subintervals along each axis as `count` runs allow.
 
-    First order takes 2 p + 1 runs a cell, second order p (p - 1) / 2 more. Raises InputError, ComputationError.
+    First order takes 2 p + 1 runs a cell, second order p (p - 1) / 2 more. Its fit raises ComputationError.
     """
-    study.intervals_only("taylor")
-    inputs, parameters, order = study.inputs, len(study.inputs), min(study.degree or 1, 2)
+    parameters, order = len(study.inputs), min(study.degree or 1, 2)
     unit = STEP * np.eye(parameters)
     places = [np.zeros((1, parameters)), unit, -unit]
     if order == 2 and parameters > 1:
@@ -71,13 +71,18 @@ def taylor(study: Study) -> Found:
     most = min(study.count or len(stencil), study.runs.left)
     cut = max(1, int((most / len(stencil)) ** (1 / parameters) + 1e-9))
     middles = np.array(list(product((2 * np.arange(cut) + 1) / cut - 1, repeat=parameters)))
-    study.runs((middles[:, None] + stencil / cut).reshape(-1, parameters))
-    runs = study.runs
+    places = (middles[:, None] + stencil / cut).reshape(-1, parameters)
+    about = "the centre" if cut == 1 else f"the centres of {cut} subintervals along each axis"
+    words = f"Taylor's series of order {order} about {about}, whose rest is not known"
+    return Plan(places, lambda made: _series(made, order, cut), words)
+
+
+def _series(study: Study, order: int, cut: int) -> Expansion | Pieces:
+    """Raises ComputationError."""
+    runs, parameters = study.runs, len(study.inputs)
     cell, local = located(runs.germs, cut)
     terms = total_degree(parameters, order)
     if len(np.unique(cell)) < cut**parameters:
         raise ComputationError(f"all runs of a subinterval failed: {runs.why}")
-    cells = [fit(inputs, local[cell == k], runs.values[cell == k], terms) for k in range(cut**parameters)]
-    about = "the centre" if cut == 1 else f"the centres of {cut} subintervals along each axis"
-    surrogate = cells[0] if cut == 1 else Pieces(cut, cells)
-    return Found(f"Taylor's series of order {order} about {about}, whose rest is not known", surrogate)
+    cells = [fit(study.inputs, local[cell == k], runs.values[cell == k], terms) for k in range(cut**parameters)]
+    return cells[0] if cut == 1 else Pieces(cut, cells)

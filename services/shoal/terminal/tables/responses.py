@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from shoal.response import Response
     from shoal.response.allocation import Allocation
     from shoal.response.boxes import Boxes
-    from shoal.response.limits import Judged
-    from shoal.response.limits.judged import Between
+    from shoal.response.limits import LimitResult
+    from shoal.response.limits.result import ProbabilityBounds
 
 
 def response_table(response: Response) -> None:
@@ -107,7 +107,7 @@ def _by_model(response: Response) -> str:
     return "" if response.errors.total is None else f" and the known error of the model, {response.errors.total:.1e} m"
 
 
-def _limit(judged: Judged) -> None:
+def _limit(judged: LimitResult) -> None:
     """Print the result of a limit, and the values at which it is decided."""
     title, shown, at = judged.limit.title, judged.shown, looked_at(judged.times)
     if judged.between is not None:
@@ -137,7 +137,7 @@ def _limit(judged: Judged) -> None:
         screen.say(f"  {how} {known}: {margin if math.isfinite(shown.margin) else shown.message}")
 
 
-def _between(title: str, judged: Judged, found: Between) -> None:
+def _between(title: str, judged: LimitResult, found: ProbabilityBounds) -> None:
     """Print two bounds of a probability, and the interval values at which they are attained."""
     (least, largest), (lower, upper) = judged.estimates, found.interval
     screen.say(

@@ -14,8 +14,8 @@ from shoal.findings import Finding, message
 from shoal.response import findings as kinds
 from shoal.response.control import unseen
 from shoal.response.inputs import Inputs
-from shoal.response.limits.choice import Passing
 from shoal.response.limits.estimate import ExceedanceEstimate
+from shoal.response.limits.exceedance import Exceedance
 from shoal.response.limits.form import DesignPoint
 from shoal.response.limits.limit import Limit
 from shoal.response.limits.margin_errors import MarginErrors
@@ -28,7 +28,7 @@ MOST_BEYOND = 0.25
 
 
 @dataclass(frozen=True)
-class Shown:
+class VerifiedRun:
     """Verified run at the design point or at the worst interval values of a limit.
 
     parameters: name -> value; values: path -> value; time [s]: of the least margin; margin: there; status: of the run;
@@ -52,7 +52,7 @@ class Shown:
 
 
 @dataclass(frozen=True)
-class Between:
+class ProbabilityBounds:
     """A probability over all values of intervals.
 
     lower, upper: judged where it is least and largest; at_lower, at_upper: name -> value of the intervals there;
@@ -60,8 +60,8 @@ class Between:
     interval values that were looked at
     """
 
-    lower: Judged
-    upper: Judged
+    lower: LimitResult
+    upper: LimitResult
     at_lower: dict[str, float]
     at_upper: dict[str, float]
     beyond: tuple[float, float]
@@ -74,7 +74,7 @@ class Between:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """From the lower end of the one to the upper end of the other, see `Judged.interval`."""
+        """From the lower end of the one to the upper end of the other, see `LimitResult.interval`."""
         return self.lower.interval[0], self.upper.interval[1]
 
     @property
@@ -123,7 +123,7 @@ def undecided(beyond: float) -> list[Finding]:
 
 
 @dataclass(frozen=True, eq=False)
-class Judged:
+class LimitResult:
     """Result for one limit.
 
     way: that was asked for; times [s]; passing: of random parameters, else None; kept: of intervals, whether no values
@@ -139,15 +139,15 @@ class Judged:
     way: str
     inputs: Inputs
     times: Array
-    passing: Passing | None
+    passing: Exceedance | None
     kept: bool | None
     margin: float
     outer: float
-    shown: Shown | None
+    shown: VerifiedRun | None
     evaluations: int
     failed: int
     reason: str
-    between: Between | None = None
+    between: ProbabilityBounds | None = None
     hidden: bool = False
     shifted: tuple[float, float, float] | None = None
 
@@ -196,7 +196,7 @@ class Judged:
         numbers = {"margin": self.margin, "error": self.errors.total or 0.0}
         return [kinds.WITHIN_ERROR.found(f"{least}, and their known error {self.errors}", **numbers)]
 
-    def _doubtful(self, passing: Passing) -> list[Finding]:
+    def _doubtful(self, passing: Exceedance) -> list[Finding]:
         """Reasons to doubt a probability: of its method, and the error of the model."""
         found, moved = list(passing.findings), self.moved
         if self.errors.unknown:
@@ -252,7 +252,7 @@ class Judged:
         found |= {"findings": [one.to_json() for one in self.findings]}
         return dict(plain({**found, "shown_by": None if self.shown is None else self.shown.to_json()}))
 
-    def _probability(self, passing: Passing) -> dict[str, Any]:
+    def _probability(self, passing: Exceedance) -> dict[str, Any]:
         estimate = passing.estimate
         lower, upper = estimate.interval
         points = [
