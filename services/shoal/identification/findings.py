@@ -136,9 +136,6 @@ CAUSE = _cautions("likely-cause", "A stated value that would lower the misfit if
 PRIOR = _cautions("prior-contradicted", "The data contradict the prior of a parameter.")
 ODD_RECORDING = _cautions("odd-recording", "One of several recordings contradicts the others.")
 ODD_STRETCH = _cautions("odd-stretch", "A stretch of the samples of one marker or sensor contradicts the rest.")
-EXCHANGED = _cautions(
-    "markers-exchanged", "The poses fit with two markers exchanged.", "check which column is which marker"
-)
 
 # Limits of an answer.
 ROUGH = _cautions("unreliable-derivatives", "Derivatives by two step sizes differ, so that intervals are in doubt.")

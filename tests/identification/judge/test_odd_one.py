@@ -72,7 +72,7 @@ def test_a_recording_of_noise_is_the_one_to_look_at() -> None:
     found = answer(a=swing(-0.4), b=swing(-0.9, seed=1), c=nothing)
     assert found.verdict is Verdict.REJECTED
     assert "odd-recording" in found.codes
-    assert found.advice[0] == "check recording c"
+    assert found.advice[0] == "check the recording c"
 
 
 @pytest.mark.slow

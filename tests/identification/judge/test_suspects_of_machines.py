@@ -8,11 +8,11 @@ import pytest
 from shoal.engines import get_engine
 from shoal.identification import Measurement, Problem
 from shoal.identification.forward import ForwardModel
-from shoal.identification.judge.stretch import odd_stretch
 from shoal.identification.judge.suspects import Suspect, suspects
 from shoal.identification.judge.suspects.candidate import FaultHypothesis
 from shoal.identification.judge.suspects.fits import Together, groups_of
 from shoal.identification.judge.suspects.of_measurement import of_measurement
+from shoal.identification.judge.suspects.of_samples import stretches
 from shoal.identification.judge.suspects.shaken import shaken
 from shoal.identification.judge.suspects.size import size_of
 from shoal.identification.methods.least_squares import descend, differentiate, least_squares
@@ -119,15 +119,18 @@ def test_a_marker_that_was_lost_for_a_while_is_told_with_its_time() -> None:
     values = run.values.copy()
     values[np.ix_(held, marker)] = values[held][0, marker]
     lost = model.aside(measurement=model.measurement.changed(lambda run: replace(run, values=values)))
-    found = odd_stretch(lost, descend(lost, np.array([-0.9]), lambda *_: None).point)
-    assert found is not None
-    assert found.code == "odd-stretch"
-    begin, end = (float(time) for time in re.findall(r"[\d.]+(?= s)", found.text))
-    assert found.text.startswith("without M from ")
+    outcome = least_squares(lost, np.random.default_rng(0), lambda *_: None)
+    seen = suspects(lost, outcome.point, *differentiate(lost, outcome.point), NOISE)
+    first = seen.suspects[0]
+    assert first.kind == "stretch"
+    assert first.significant
+    begin, end = (float(time) for time in re.findall(r"[\d.]+(?= s)", first.name))
+    assert first.name.startswith("M from ")
     assert begin == pytest.approx(1.0, abs=0.11)
     assert end == pytest.approx(1.3, abs=1e-3)
-    assert found.steps[0].startswith("check M from ")
-    assert odd_stretch(model_of({"gravity": [0.0, -9.0]}), np.array([-0.9])) is None
+    assert first.value == pytest.approx(NOISE, rel=0.2)
+    other = model_of({"gravity": [0.0, -9.0]})
+    assert not [*stretches(other, np.array([-0.9]))]
 
 
 @pytest.mark.slow

@@ -1,20 +1,23 @@
 """F-tests of nested models: whether the data contradict something that was taken as known.
 
-Each hypothesis frees something stated: a mass, a clock, the place of a pivot. Its effect on the residual, made
+A hypothesis frees something stated (a mass, a clock, the place of a pivot), reads the data otherwise (units, exchanged
+columns) or leaves samples out (a recording, a stretch of a marker). The effect of what is freed on the residual, made
 orthogonal to what the sought parameters follow, gives to first order the drop of chi-square if it is freed (score test:
-Rao 1948); a fit with it freed gives the drop itself. Without a fault the drop over its freedom is F-distributed. The
-noise is the one that the freed model leaves: what explains a misfit only in part leaves a slow residual of few
-independent samples, so that no drop of it is significant. One Jacobian serves all score tests, and all are tested
-together: many effects are alike, so that the number of independent tests is the one that their correlations leave (Li
-and Ji, Heredity 95, 2005).
+Rao 1948); a fit with it freed gives the drop itself. Samples that are left out are as many freed numbers (Chow,
+Econometrica 28, 1960). Without a fault the drop over its freedom is F-distributed. The noise is the one that the freed
+model leaves: what explains a misfit only in part leaves a slow residual of few independent samples, so that no drop of
+it is significant. One Jacobian serves all score tests, and all are tested together: many effects are alike, so that the
+number of independent tests is the one that their correlations leave (Li and Ji, Heredity 95, 2005).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
+import numpy.typing as npt
 
 from shoal.identification.forward import ForwardModel
 from shoal.identification.spread.chances import above_f
@@ -22,6 +25,11 @@ from shoal.identification.spread.covariance import Block, Noise, blocks_of, corr
 from shoal.identification.spread.given import Given
 from shoal.identification.spread.uncertainty import followed
 from shoal.trajectory import Array
+
+Mask = npt.NDArray[np.bool_]
+
+SAMPLES = ("recording", "stretch")
+"""Kinds of hypotheses that leave samples out: the data contradict each other, and not what is stated."""
 
 SIGNIFICANT = 5e-4
 """P-value over all hypotheses below which the data contradict one: of 2000 right models one is rejected."""
@@ -61,8 +69,11 @@ class Hypothesis:
 
     @property
     def explains(self) -> bool:
-        """Return whether a fit shows that this is what the residual is due to."""
-        return self.fitted and (self.significant or self.explained >= _MOST)
+        """Return whether a fit shows that this is what the residual is due to.
+
+        Any samples that are left out take their share of the residual with them: only the test decides about these.
+        """
+        return self.fitted and (self.significant or (self.explained >= _MOST and self.kind not in SAMPLES))
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +92,7 @@ class ScoreTest:
     noise: Sequence[Noise]
     given: Sequence[Given]
     stated: bool
-    rows: Array
+    rows: Mask
 
     @classmethod
     def of(cls, model: ForwardModel, residual: Array, jacobian: Array) -> ScoreTest:
@@ -108,6 +119,34 @@ class ScoreTest:
             return 0.0, 1.0, 0.0
         drop, chance = self._f_test(np.array([np.sqrt(gain)]), (along / np.linalg.norm(along))[None], noise, numbers)
         return drop, chance, gain / power
+
+    def without(self, rows: Mask) -> tuple[float, float, float]:
+        """Return what `left_out` does, to first order in the parameters."""
+        basis = self.basis * ~rows[:, None]
+        rest = np.where(rows, 0.0, self.residual)
+        return self.left_out(rest - basis @ np.linalg.lstsq(basis, rest)[0], basis, rows)
+
+    def left_out(self, after: Array, jacobian: Array, rows: Mask) -> tuple[float, float, float]:
+        """Return the drop of chi-square by leaving rows out, its p-value, and the share of the mean square.
+
+        after: residual of the fit to the rest, zero elsewhere, (rows,); jacobian: (rows, parameters) there
+        rows: which are left out, (rows,). The mean square of what they add, over that of the rest, is F-distributed
+        with as many samples as the memory of the noise leaves independent for a variance (Bartlett 1935).
+        """
+        after, before = after * self.rows, self.residual * self.rows
+        kept = [block for one in self.blocks if len((block := _part(one, ~rows)).rows) and not block.known]
+        noise = estimate_noise(after, followed(jacobian)[0], kept)
+        counts = np.array([len(block.rows) for block in kept])
+        power, gain = float(before @ before), float(before @ before - after @ after)
+        number = int(np.sum(rows & self.rows))
+        if not (gain > 0.0 and number and len(kept)):
+            return 0.0, 1.0, 0.0
+        variance = max(float(counts @ [one.variance for one in noise]) / counts.sum(), 1e-300)
+        shares = np.array([(1.0 - one.rho**2) / (1.0 + one.rho**2) for one in noise])
+        independent = float(counts @ shares)
+        freedom = max(1.0, independent - jacobian.shape[1])
+        drop, numbers = gain / variance, max(1.0, number * independent / counts.sum())
+        return drop, above_f(numbers, freedom, drop / number), gain / power
 
     def score(self, effects: Array) -> tuple[float, float, float, Array]:
         """Return the drop of chi-square, its p-value, the share of the mean square, and the unit effect (rows,).
@@ -168,6 +207,13 @@ class ScoreTest:
         return np.array(found)
 
 
+def _part(block: Block, kept: Mask) -> Block:
+    """Return the rows of a block that are kept, (rows,)."""
+    mine = kept[block.rows]
+    positions = np.concatenate([[0.0], np.cumsum(block.gaps)])[mine]
+    return replace(block, rows=block.rows[mine], gaps=np.diff(positions))
+
+
 _AGAIN = 0.01
 """P-value from which down a noise is estimated again."""
 _UNSEEN = 1e-6
@@ -177,10 +223,16 @@ Effects = Mapping[tuple[str, str, int], Sequence[Array]]
 """By name, kind and how many numbers are freed: the effects (effects, rows) by each way to measure them."""
 
 
-def table(test: ScoreTest, effects: Effects) -> tuple[list[Hypothesis], float]:
+LeftOutRows = Mapping[tuple[str, str], Mask]
+"""By name and kind: the rows (rows,) that are left out."""
+
+
+def table(
+    test: ScoreTest, effects: Effects, left_out: LeftOutRows = MappingProxyType({})
+) -> tuple[list[Hypothesis], float]:
     """Return the hypotheses by their effects, the most significant first, and how many independent tests they are.
 
-    Of several ways to measure an effect the best counts.
+    left_out: samples that are. Of several ways to measure an effect the best counts.
     """
     scored, units = list[tuple[tuple[str, str, int], tuple[float, float, float]]](), list[Array]()
     for key, ways in effects.items():
@@ -189,7 +241,8 @@ def table(test: ScoreTest, effects: Effects) -> tuple[list[Hypothesis], float]:
         if found:
             units += [unit for *_, unit in found]
             scored.append((key, min(found, key=lambda one: one[1])[:3]))
-    tests = independent(np.array(units)) if units else 1.0
+    scored += [((*key, int(np.sum(rows))), test.without(rows)) for key, rows in left_out.items()]
+    tests = (independent(np.array(units)) if units else 1.0) + len(left_out)
     rows = [Hypothesis(*key, drop, p, min(1.0, tests * p), share) for key, (drop, p, share) in scored]
     return sorted(rows, key=lambda row: (row.chance, row.name)), tests
 

@@ -9,16 +9,13 @@ import numpy as np
 
 from shoal.findings import Finding
 from shoal.identification import findings as kinds
-from shoal.identification.deadline import TimeIsUp, unless_late
+from shoal.identification.deadline import TimeIsUp
 from shoal.identification.findings import Verdict, verdict_of
 from shoal.identification.forward import ForwardModel
-from shoal.identification.judge.exchanged import exchanged
-from shoal.identification.judge.hypotheses import Hypothesis, ScoreTest
-from shoal.identification.judge.odd_one import odd_one
+from shoal.identification.judge.hypotheses import SAMPLES, Hypothesis, ScoreTest
 from shoal.identification.judge.residual_tests import ResidualTests, residual_tests
 from shoal.identification.judge.rivals import ALIAS, relation, rivals_of, within
 from shoal.identification.judge.stationarity import downhill, sentence
-from shoal.identification.judge.stretch import odd_stretch
 from shoal.identification.judge.suspects import FaultSearch, Suspect, suspects
 from shoal.identification.methods.growth import LARGE, growth
 from shoal.identification.methods.lanes import Descent
@@ -34,8 +31,6 @@ _DECISIVE = 5.0
 """What lowers even a small misfit by this factor refutes what was stated, though intervals that hold it were wide."""
 _NEGLIGIBLE = 1e-4
 """Of the signal: a misfit below it is not looked into."""
-_LOUD = 1.5
-"""Times what noise explains: what leaves more is not the whole cause."""
 _FAR_OFF = 5.0
 """Standard deviations of a prior, from where on the data contradict it."""
 _OTHERS = 3
@@ -116,14 +111,11 @@ def _by_findings(
         met = kinds.BETTER_MINIMUM.found(reason, fitness=outcome.fitness, better=better.fitness)
         return Judgement([met], better=better)
     found = looked.suspects
-    # A suspect that leaves more than noise explains less than a stretch or a recording that is left out.
-    odd: Finding | None = None
-    if misfitting and not looked.cut and (not found or found[0].after > _LOUD * tests.explained):
-        odd = unless_late(lambda: odd_stretch(model, outcome.point), odd)
     moved = _moved(parameters, looked, tests.rows)
-    decisive = bool(found) and found[0].before >= _DECISIVE * found[0].after
+    # Samples that contradict the others refute nothing that was stated.
+    decisive = bool(found) and found[0].kind not in SAMPLES and found[0].before >= _DECISIVE * found[0].after
     if tests.wrong_model or decisive or (misfitting and moved):
-        return Judgement(_rejected(model, outcome, seen, tests, found, odd))
+        return Judgement(_rejected(model, seen, tests, found))
     if moved:
         return Judgement([_contradicted(tests, looked, moved)])
     if looked.cut and misfitting:
@@ -137,7 +129,7 @@ def _by_findings(
     refits = [*looked.refits.values()]
     values = with_refits(model, parameters, refits)
     limits = _limits(values, unknown)
-    return Judgement([*limits, *_cautions(model, seen, tests, found, odd)], refits=refits)
+    return Judgement([*limits, *_cautions(model, seen, tests, found)], refits=refits)
 
 
 def _ambiguous(relations: set[str], count: int) -> Finding:
@@ -154,7 +146,8 @@ def _moved(parameters: Mapping[str, Value], looked: FaultSearch, rows: int) -> l
 
     Another reading of the data has no interval in common with the stated one: it moves all parameters.
     """
-    best = {(s.name, s.kind) for s in looked.suspects if s.significant and s.equals(looked.suspects[0], rows)}
+    stated = [s for s in looked.suspects if s.kind not in SAMPLES]
+    best = {(s.name, s.kind) for s in stated if s.significant and s.equals(looked.suspects[0], rows)}
     ends = [looked.refits[key].values() if key in looked.refits else {} for key in best]
     return [
         name
@@ -200,36 +193,47 @@ def _fits_until(model: ForwardModel, point: Array, seen: Sensitivity) -> bool:
     return not residual_tests(part, seen.residual[kept], blocks, near.noise).wrong_model
 
 
-def _rejected(
-    model: ForwardModel,
-    outcome: Outcome,
-    seen: Sensitivity,
-    tests: ResidualTests,
-    found: list[Suspect],
-    odd: Finding | None,
-) -> list[Finding]:
-    """Return the misfit and its likely causes, the likeliest first. odd: a stretch that contradicts the rest."""
+def _rejected(model: ForwardModel, seen: Sensitivity, tests: ResidualTests, found: list[Suspect]) -> list[Finding]:
+    """Return the misfit and its likely causes, the likeliest first."""
     numbers = {"residual": tests.size, "noise": tests.noise, "signal": tests.signal}
     text = f"the best fit is off by {tests.sized(tests.size)}, {_against(tests)}"
-    causes = [_cause(found, tests.rows)] if found else []
-    odd = odd or unless_late(lambda: odd_one(model, outcome.point, seen.residual), None)
-    if odd is not None:
-        causes.insert(0 if found and found[0].after > _LOUD * tests.explained else len(causes), odd)
+    causes = _causes(found, tests.rows)
     for name, off in _against_priors(model, seen.residual):
         said = f"{name} is {off:.2g} standard deviations off its prior"
         causes.insert(0, kinds.PRIOR.found(said, f"check the prior of {name}", standard_deviations=off))
-    if (exchange := unless_late(lambda: exchanged(model), None)) is not None:
-        causes.append(exchange)
     more = () if causes else ("check lengths, masses and friction of the model, and which bodies bend",)
     return [kinds.MISFIT.found(text, *more, **numbers), *causes]
 
 
+_CAUSES = {"recording": kinds.ODD_RECORDING, "stretch": kinds.ODD_STRETCH}
+"""Kinds of findings by those of suspects; the others are likely causes."""
+
+
+def _causes(found: list[Suspect], rows: int) -> list[Finding]:
+    """Return the likely cause of a misfit, the best suspect with its equals; then the best samples that contradict it.
+
+    A recording that contradicts the others is where a cause is that frees fewer numbers.
+    """
+    odd = next((s for s in found if s.kind in SAMPLES), None)
+    best = [found[0], *([odd] if odd is not None and odd is not found[0] else [])] if found else []
+    return [_cause([one, *(s for s in found if s is not one)], rows) for one in best]
+
+
 def _cause(found: list[Suspect], rows: int) -> Finding:
-    """Return the likely cause of a misfit: the best suspect with its equals."""
+    """Return the finding about the first suspect, with its equals."""
     text, advice = _named(found, rows)
     best = found[0]
     numbers = {"stated": best.stated, "fitted": best.value, "before": best.before, "after": best.after}
-    return kinds.CAUSE.found(text, *advice, **numbers)
+    return _CAUSES.get(best.kind, kinds.CAUSE).found(text, *advice, **numbers)
+
+
+_SEEK = {
+    "data": "",
+    "bounds": ": widen its bounds",
+    "recording": "",
+    "stretch": ": cells of a lost marker are left empty",
+}
+"""What else to do than to check a suspect, by its kind."""
 
 
 def _named(found: list[Suspect], rows: int) -> tuple[str, list[str]]:
@@ -238,7 +242,7 @@ def _named(found: list[Suspect], rows: int) -> tuple[str, list[str]]:
     best, *equals = (suspect.words for suspect in found if suspect.equals(found[0], rows))
     cause = f"{found[0]} (as would {', '.join(equals)})" if equals else str(found[0])
     others = [suspect.words for suspect in found if suspect.words not in (best, *equals)][:_OTHERS]
-    seek = {"data": "", "bounds": ": widen its bounds"}.get(found[0].kind, ", or seek it as a parameter")
+    seek = _SEEK.get(found[0].kind, ", or seek it as a parameter")
     advice = [f"check the {' or the '.join([best, *equals])}{seek}"]
     return cause, advice + ([f"less likely: the {' or the '.join(others)}"] if others else [])
 
@@ -282,9 +286,7 @@ def _limits(parameters: Mapping[str, Value], unknown: list[str]) -> list[Finding
     return found
 
 
-def _cautions(
-    model: ForwardModel, seen: Sensitivity, tests: ResidualTests, found: list[Suspect], odd: Finding | None
-) -> list[Finding]:
+def _cautions(model: ForwardModel, seen: Sensitivity, tests: ResidualTests, found: list[Suspect]) -> list[Finding]:
     """Return what limits the intervals of an answer that is not rejected."""
     noted = list[Finding]()
     if not seen.reliable:
@@ -297,10 +299,10 @@ def _cautions(
         size = f"{tests.sized(tests.excess)} ({share:.2g} % of the signal)"
         text = f"a systematic residual of {size} widens the intervals: the model, not the noise, limits them"
         noted.append(kinds.SYSTEMATIC.found(text, excess=tests.excess, signal=tests.signal))
-    if found:
+    if found and found[0].kind in SAMPLES:
+        noted.append(_cause(found, tests.rows))
+    elif found:
         noted.append(kinds.CAUSE.found(f"{found[0]}; the intervals hold the answer with it too"))
-    if systematic and odd is not None:
-        noted.append(odd)
     if not systematic and not found and tests.too_large:
         text = f"the noise is {tests.ratio:.3g} times what was stated; the intervals go by what was found"
         noted.append(kinds.NOISE_UNDERSTATED.found(text, ratio=tests.ratio))

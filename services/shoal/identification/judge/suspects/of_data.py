@@ -75,7 +75,17 @@ def of_data(model: ForwardModel) -> Iterator[Reading]:
     for one, other in combinations(model.measurement.recordings, 2):
         if (changed := _files_exchanged(model, one, other)) is not None:
             yield Reading(f"files of recordings {one} and {other}", "exchanged, they", changed, -1.0)
+    yield from _of_markers(model)
     yield from _of_columns(model, [*{c.name: c for run in runs for c in run.channels}.values()])
+
+
+def _of_markers(model: ForwardModel) -> Iterator[Reading]:
+    """Pairs of markers whose positions are exchanged in all recordings, as those that a tracker has confused."""
+    channels = {(c.marker, c.quantity) for run in model.measurement.recordings.values() for c in run.channels}
+    markers = sorted({marker for marker, quantity in channels if {(marker, "x"), (marker, "y")} <= channels})
+    for one, other in list(combinations(markers, 2))[:_PAIRS]:
+        swapped = _read(model, _markers_exchanged({one: other, other: one}))
+        yield Reading(f"columns of {one} and {other}", "exchanged, they", swapped, -1.0)
 
 
 def _of_columns(model: ForwardModel, channels: list[Channel]) -> Iterator[Reading]:
@@ -155,11 +165,22 @@ def _swapped(one: str, other: str) -> Callable[[Recording], Recording]:
 
 def _exchanged(run: Recording) -> Recording:
     """With x and y of each marker that has both exchanged."""
-    order: dict[tuple[str, str], int] = {(c.marker, c.quantity): k for k, c in enumerate(run.channels)}
     other = {"x": "y", "y": "x"}
-    columns: list[int] = [
-        order.get((channel.marker, other.get(channel.quantity, "")), k) for k, channel in enumerate(run.channels)
-    ]
+    return _reordered(run, {(c.marker, c.quantity): (c.marker, other.get(c.quantity, "")) for c in run.channels})
+
+
+def _markers_exchanged(other: dict[str, str]) -> Callable[[Recording], Recording]:
+    def change(run: Recording) -> Recording:
+        positions = [c for c in run.channels if c.is_position and c.marker in other]
+        return _reordered(run, {(c.marker, c.quantity): (other[c.marker], c.quantity) for c in positions})
+
+    return change
+
+
+def _reordered(run: Recording, source: dict[tuple[str, str], tuple[str, str]]) -> Recording:
+    """With channels, by marker and quantity, that show the columns of others where there are such."""
+    order: dict[tuple[str, str], int] = {(c.marker, c.quantity): k for k, c in enumerate(run.channels)}
+    columns = [order.get(source.get(key, key), k) for key, k in order.items()]
     return replace(run, values=run.values[:, columns], noise=run.noise[columns])
 
 

@@ -3,12 +3,14 @@
 A wrong clock or an omitted mass is a fault that no fit of the parameters shows. Each candidate is freed in turn and the
 residual is regressed on its effect, the parameters following; the most promising are then fitted together with the
 parameters, until one leaves no more than noise. A misfit that is a good part of the signal may also come from another
-reading of the numbers. Where nothing explains it, values of each candidate are tried over its whole range. Whatever is
-fitted becomes a row of the table of hypotheses, and one F-test decides about all of them.
+reading of the numbers. Where nothing explains it, values of each candidate are tried over its whole range, and samples
+that contradict the rest are looked for. Whatever is scored or fitted is a row of the table of hypotheses, and one
+F-test decides about all of them.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
@@ -16,7 +18,7 @@ import numpy as np
 
 from shoal.identification.deadline import TimeIsUp
 from shoal.identification.forward import ForwardModel
-from shoal.identification.judge.hypotheses import Hypothesis, ScoreTest, table
+from shoal.identification.judge.hypotheses import SAMPLES, Hypothesis, ScoreTest, table
 from shoal.identification.judge.suspects.bending import bending
 from shoal.identification.judge.suspects.candidate import FaultHypothesis
 from shoal.identification.judge.suspects.fits import Together, groups_of
@@ -24,6 +26,7 @@ from shoal.identification.judge.suspects.of_bounds import at_bound, told, withou
 from shoal.identification.judge.suspects.of_data import Reading, misfit, of_data
 from shoal.identification.judge.suspects.of_machine import of_machine
 from shoal.identification.judge.suspects.of_measurement import of_measurement
+from shoal.identification.judge.suspects.of_samples import LeftOut, recordings, stretches
 from shoal.identification.judge.suspects.shaken import shaken
 from shoal.identification.judge.suspects.suspect import Suspect, penalty
 from shoal.identification.methods.lanes import Descent, descend_many
@@ -162,11 +165,11 @@ class _FaultSearch:
         Candidates near the answer, other readings, those that take long, those far from it; then whether a better
         minimum was met.
         """
-        simple = [*of_measurement(self.model), *of_machine(self.model)]
+        simple, whole = [*of_measurement(self.model), *of_machine(self.model)], [*recordings(self.model)]
         scored = self._promising(simple)
-        self.scored, self.tests = table(self.test, self.measured)
+        self.scored, self.tests = table(self.test, self.measured, {(one.name, one.kind): one.rows for one in whole})
         significant = {(row.name, row.kind) for row in self.scored if row.significant}
-        if not misfit and not significant:
+        if not misfit and all(kind in SAMPLES for _, kind in significant):
             return
         self._free_bounds()
         if self._explained:
@@ -187,6 +190,9 @@ class _FaultSearch:
             self._fit(sorted(scans, key=lambda s: s.promise)[:_AFTER_SCAN])
         if not self._explained:
             self._follow()
+        self._leave_out([one for one in whole if (one.name, one.kind) in significant])
+        if self._least > _WHOLLY * self.noise:
+            self._leave_out(stretches(self.model, self.point))
         self._look_back()
 
     def _groups(self, candidates: list[FaultHypothesis]) -> list[Together]:
@@ -353,19 +359,57 @@ class _FaultSearch:
         """
         share = 1.0 if read is None else self.model.rows.signal / read.rows.signal
         residual, jacobian, others = share * end.residual, share * end.jacobian, None
-        after, known = misfit(residual), self.fits.get((name, kind))
-        if not after < (np.inf if known is None else known[0].after):
+        known = self.fits.get((name, kind))
+        if not misfit(residual) < (np.inf if known is None else known[0].after):
             return False
         if read is None:
             residual = residual - (self.residual - self.test.residual)
         else:
             others = blocks_of(read, len(residual))
-        drop, chance, explained = self.test.fit(residual, jacobian, max(numbers, 1), others)
-        row = Hypothesis(name, kind, numbers, drop, chance, min(1.0, self.tests * chance), explained, fitted=True)
+        tested = self.test.fit(residual, jacobian, max(numbers, 1), others)
+        return self._note(
+            name, kind, numbers, tested, self.tests, (stated, value, change), misfit(share * end.residual)
+        )
+
+    def _note(
+        self,
+        name: str,
+        kind: str,
+        numbers: int,
+        tested: tuple[float, float, float],
+        tests: float,
+        told: tuple[float, float, str],
+        after: float,
+    ) -> bool:
+        """Return whether a fit explains the misfit; its row enters the table.
+
+        tested: drop, p-value and share; tests: so many hypotheses were looked at; told: stated and other value, words
+        """
+        drop, chance, explained = tested
+        row = Hypothesis(name, kind, numbers, drop, chance, min(1.0, tests * chance), explained, fitted=True)
+        stated, value, change = told
         unit = of_channels(self.model.measurement)
         suspect = Suspect(name, stated, value, self.before, after, change, unit, kind, numbers, row.corrected)
         self.fits[name, kind] = suspect, row
         return row.explains
+
+    def _leave_out(self, samples: Iterable[LeftOut]) -> None:
+        """Fit the rest of the samples, from where all were fitted and from its own starts."""
+        for one in samples:
+            starts = np.vstack([one.place(self.model, self.point), starting_points(one.model)[:3]])
+            end = min(descend_many(one.model, starts, patience=_PATIENCE), key=lambda end: end.fitness)
+            if not np.all(np.isfinite(end.residual)):
+                continue
+            # Rows count as they do beside those that are left out.
+            kept = ~one.rows[: len(self.model.rows.weight)]
+            weight = np.ones(len(end.residual))
+            weight[: int(np.sum(kept))] = self.model.rows.weight[kept] / one.model.rows.weight
+            residual = np.zeros(len(self.residual))
+            jacobian = np.zeros((len(residual), len(one.model.names)))
+            residual[~one.rows], jacobian[~one.rows] = weight * end.residual, weight[:, None] * end.jacobian
+            tested, count = self.test.left_out(residual, jacobian, one.rows), int(np.sum(one.rows))
+            left, tests = misfit(residual[~one.rows]), self.tests * one.windows
+            self._note(one.name, one.kind, count, tested, tests, (0.0, left, "left out, it"), misfit(residual))
 
     def _read(self) -> None:
         """Fit the readings that begin best, each from its own starts; misfits count against the spread of the data."""
