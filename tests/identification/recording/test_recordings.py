@@ -112,8 +112,8 @@ DOUBLE = {
     "name": "double",
     "scene": "rigid-double-pendulum",
     "parameters": {
-        "first": {"path": "initial.OA.angle", "lower": -2.0, "upper": 0.0},
-        "second": {"path": "initial.AB.angle", "lower": -2.0, "upper": 0.0},
+        "first": {"path": "initial.OA.angle", "lower": -1.0, "upper": 2.0},
+        "second": {"path": "initial.AB.angle", "lower": -1.0, "upper": 2.0},
     },
     "channels": [{"marker": m, "quantity": q, "column": m + q} for m in "AB" for q in "xy"],
     "source": {"kind": "engine", "engine": "gauss", "stop": 1.0, "count": 50},
