@@ -125,7 +125,7 @@ def test_a_marker_that_was_lost_for_a_while_is_told_with_its_time() -> None:
     assert first.kind == "stretch"
     assert first.significant
     begin, end = (float(time) for time in re.findall(r"[\d.]+(?= s)", first.name))
-    assert first.name.startswith("M from ")
+    assert first.name.startswith("samples of M from ")
     assert begin == pytest.approx(1.0, abs=0.11)
     assert end == pytest.approx(1.3, abs=1e-3)
     assert first.value == pytest.approx(NOISE, rel=0.2)

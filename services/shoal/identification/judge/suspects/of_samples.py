@@ -78,7 +78,9 @@ def stretches(model: ForwardModel, point: Array) -> Iterator[LeftOut]:
     samples = [len(run.times) for run in runs.values()]
     places = sum(len({c.place for c in run.channels}) for run in runs.values())
     windows = (places * max(samples) ** 2 / 2) ** len(found)
-    yield _without(model, " and ".join(one.words(model) for one in found), "stretch", runs, rows, windows)
+    yield _without(
+        model, f"samples of {' and '.join(one.words(model) for one in found)}", "stretch", runs, rows, windows
+    )
 
 
 def _without(

@@ -408,8 +408,8 @@ class _FaultSearch:
             jacobian = np.zeros((len(residual), len(one.model.names)))
             residual[~one.rows], jacobian[~one.rows] = weight * end.residual, weight[:, None] * end.jacobian
             tested, count = self.test.left_out(residual, jacobian, one.rows), int(np.sum(one.rows))
-            left, tests = misfit(residual[~one.rows]), self.tests * one.windows
-            self._note(one.name, one.kind, count, tested, tests, (0.0, left, "left out, it"), misfit(residual))
+            told = 0.0, misfit(residual[~one.rows]), f"left out, {'it' if one.kind == 'recording' else 'they'}"
+            self._note(one.name, one.kind, count, tested, self.tests * one.windows, told, misfit(residual))
 
     def _read(self) -> None:
         """Fit the readings that begin best, each from its own starts; misfits count against the spread of the data."""
