@@ -17,10 +17,10 @@ from shoal.identification.evidence import Evidence, evidence
 from shoal.identification.findings import Verdict
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.judgement import Judgement, judge
+from shoal.identification.judge.minima.rivals import valley
+from shoal.identification.judge.minima.turns import with_nearest_turns
 from shoal.identification.judge.other_laws import OtherLaw, other_laws, wider_by_other_laws
 from shoal.identification.judge.remarks import beyond_noise, remarks
-from shoal.identification.judge.rivals import valley
-from shoal.identification.judge.turns import with_nearest_turns
 from shoal.identification.lengthening import lengthened
 from shoal.identification.methods.growth import FRACTAL, LARGE, growth
 from shoal.identification.methods.lanes import Descent, descend_many, descend_on
@@ -92,7 +92,7 @@ def conclude(
     if better is not None and rounds > 0:
         met = better  # as far as a search for something else went
         better = unless_late(lambda: descend_on(model, met), met)
-        return conclude(searched, _moved(outcome, better), method, seed, wall, stages, wishes, rounds - 1)
+        return conclude(searched, _followed(outcome, better), method, seed, wall, stages, wishes, rounds - 1)
     point, at, measurement = near.point, near.at, model.measurement
     foretold: list[Prediction] = unless_late(
         lambda: predictions(
@@ -104,6 +104,7 @@ def conclude(
     findings = [
         *_refuted(judgement, foretold),
         *(judgement.findings or _ended(outcome)),
+        *outcome.findings,
         *(_beside(model, near, known, values) if judgement.verdict.trusted else []),
         *remarks(
             values,
@@ -280,13 +281,11 @@ def _fitted(scene: Scene) -> dict[str, Any]:
     return found | {f"solver.{name}": getattr(scene.solver, name) for name in ("integrator", "step", "inertia_cap")}
 
 
-def _moved(outcome: Outcome, better: Descent, how: str = "least squares from a refit") -> Outcome:
-    """The outcome at a better minimum; where it was is left as another one."""
-    choice = "; then ".join(part for part in (outcome.choice, how) if part)
-    minima = [(outcome.point, outcome.fitness), *outcome.minima]
-    message = "" if better.converged else "no convergence"
-    moved = replace(outcome, point=better.point, fitness=better.fitness, minima=minima, choice=choice)
-    return replace(moved, message=message, converged=better.converged)
+def _followed(outcome: Outcome, better: Descent) -> Outcome:
+    """Return the outcome at a better minimum that a refit met, with a finding that says so."""
+    text = f"a refit met a better minimum, of fitness {better.fitness:.3g} instead of {outcome.fitness:.3g}"
+    said = kinds.BETTER_FOLLOWED.found(text, fitness=outcome.fitness, better=better.fitness)
+    return replace(outcome.moved(better, "least squares from a refit"), findings=[*outcome.findings, said])
 
 
 def _settled(model: ForwardModel, outcome: Outcome, near: Evidence) -> tuple[Outcome, Evidence]:
@@ -298,7 +297,7 @@ def _settled(model: ForwardModel, outcome: Outcome, near: Evidence) -> tuple[Out
     better = unless_late(lambda: lengthened(model, outcome.point), None)
     if better is None:
         return outcome, near
-    moved = _moved(outcome, better, "over a lengthening record")
+    moved = outcome.moved(better, "over a lengthening record")
     return replace(moved, minima=outcome.minima), evidence(model, moved.point)
 
 

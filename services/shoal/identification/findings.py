@@ -73,6 +73,9 @@ NO_CONVERGENCE = _rejects(
     "The search ended where it had not converged.",
     "start from a better place, or look for another minimum (--method multi-start)",
 )
+BETTER_FOLLOWED = _notes(
+    "better-minimum-followed", "A diagnostic met a better minimum, from which the search went on to this answer."
+)
 SEARCH_ENDED = _notes("search-ended", "How the search ended, where there is something to say about it.")
 OUT_OF_BOUNDS = _rejects(
     "out-of-bounds",

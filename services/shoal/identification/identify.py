@@ -22,8 +22,7 @@ from shoal.identification.conclude import NOTHING, Wishes, conclude
 from shoal.identification.deadline import Deadline, TimeIsUp, unless_late
 from shoal.identification.estimate import Estimate
 from shoal.identification.forward import ForwardModel
-from shoal.identification.judge.aliases import with_aliases
-from shoal.identification.judge.mirrors import with_mirror_images
+from shoal.identification.judge.minima.search import with_other_minima
 from shoal.identification.measure import Windows, measure
 from shoal.identification.methods import Method, Outcome, get_method
 from shoal.identification.methods.starts import starting_points
@@ -189,9 +188,7 @@ def _search(
         searched, at_end = model, outcome
         model, outcome = unless_late(lambda: repaced(searched, at_end, progress), (searched, at_end))
     if outcome.ended:
-        found = outcome
-        known = unless_late(lambda: with_aliases(model, found), found)
-        outcome = unless_late(lambda: with_mirror_images(model, known), known)
+        outcome = with_other_minima(model, outcome)
     if model.refusal and not np.isfinite(outcome.fitness):
         raise InputError(_refused(model))
     return model, outcome, stages

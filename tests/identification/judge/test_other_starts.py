@@ -13,11 +13,12 @@ from scipy.spatial.transform import Rotation
 from shoal.engines import get_engine
 from shoal.identification import Estimate, Problem, Verdict, identify
 from shoal.identification.forward import ForwardModel
-from shoal.identification.judge.aliases import with_aliases
-from shoal.identification.judge.mirrors import with_mirror_images
-from shoal.identification.judge.other_starts import mirrored, turned
-from shoal.identification.judge.rivals import apart
-from shoal.identification.judge.turns import nearest_turns
+from shoal.identification.judge.minima.aliases import more_turns
+from shoal.identification.judge.minima.mirrors import mirror_images
+from shoal.identification.judge.minima.other_starts import mirrored, turned
+from shoal.identification.judge.minima.rivals import apart
+from shoal.identification.judge.minima.search import followed
+from shoal.identification.judge.minima.turns import nearest_turns
 from shoal.identification.measure import measure
 from shoal.identification.methods.lanes import descend_many
 from shoal.identification.methods.outcome import Outcome
@@ -118,7 +119,8 @@ def test_whole_turns_between_samples_are_told_of_a_free_body(tmp_path: Path) -> 
     }
     free = modelled(problem(tmp_path, scene, spins, seen))
     (end,) = descend_many(free, np.array([[0.0, 0.0, 40.0 - 2 * TURN]]))
-    found = with_mirror_images(free, Outcome(end.point, end.fitness, end.rows, end.message))
+    begun = Outcome(end.point, end.fitness, end.rows, end.message)
+    found = followed(free, begun, mirror_images(free, begun), "a mirror image")
     alike = [point for point, fitness in [(found.point, found.fitness), *found.minima] if fitness < 1.2 * end.fitness]
     assert np.min(np.abs(np.array(alike)[:, 2] - 40.0)) < 0.02
 
@@ -137,7 +139,9 @@ def test_a_misfit_by_too_few_turns_leads_on_to_the_true_ones(axis: Array | None,
     wheel = modelled(problem(tmp_path, rotor(axis, 0.002), sought, seen))
     (end,) = descend_many(wheel, wheel.parameters.to_vector(np.array([[95.0 - TURN, 0.006]])))
     assert end.fitness > 10 * NOISE**2
-    found = with_aliases(wheel, Outcome(end.point, end.fitness, end.rows, end.message))
+    begun = Outcome(end.point, end.fitness, end.rows, end.message)
+    found = followed(wheel, begun, more_turns(wheel, begun), "more turns")
+    assert [one.code for one in found.findings] == ["better-minimum-followed"]
     np.testing.assert_allclose(wheel.parameters.to_values(found.point), [95.0, 0.002], rtol=2e-3)
     assert found.fitness < 3 * NOISE**2
 

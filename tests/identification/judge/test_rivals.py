@@ -14,9 +14,9 @@ from scipy.special import ellipk
 from shoal.engines import get_engine
 from shoal.identification import Problem, Verdict, identify
 from shoal.identification.forward import ForwardModel
-from shoal.identification.judge.mirrors import images
-from shoal.identification.judge.rivals import connected
-from shoal.identification.judge.turns import nearest_turns
+from shoal.identification.judge.minima.mirrors import images
+from shoal.identification.judge.minima.rivals import connected
+from shoal.identification.judge.minima.turns import nearest_turns
 from shoal.identification.measure import measure
 from shoal.identification.problem import Parameter
 

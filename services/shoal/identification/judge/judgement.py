@@ -13,8 +13,8 @@ from shoal.identification.deadline import TimeIsUp
 from shoal.identification.findings import Verdict, verdict_of
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.hypotheses import SAMPLES, Hypothesis, ScoreTest
+from shoal.identification.judge.minima.rivals import ALIAS, relation, rivals_of, within
 from shoal.identification.judge.residual_tests import ResidualTests, residual_tests
-from shoal.identification.judge.rivals import ALIAS, relation, rivals_of, within
 from shoal.identification.judge.stationarity import downhill, sentence
 from shoal.identification.judge.suspects import FaultSearch, Suspect, suspects
 from shoal.identification.methods.growth import LARGE, growth

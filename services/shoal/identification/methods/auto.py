@@ -11,7 +11,7 @@ import numpy.typing as npt
 from shoal.errors import InputError
 from shoal.identification.forward import ForwardModel, Progress
 from shoal.identification.methods.growth import FRACTAL, LARGE, growth, swings
-from shoal.identification.methods.lanes import descend_many, differentiate_many, differing, distinct
+from shoal.identification.methods.lanes import Descent, descend_many, differentiate_many, differing, distinct
 from shoal.identification.methods.least_squares import PATIENCE, differentiate, from_starts
 from shoal.identification.methods.multiple_shooting import multiple_shooting
 from shoal.identification.methods.outcome import Outcome
@@ -28,7 +28,6 @@ _SWINGS = 3
 _FACTOR, _ELSEWHERE, _DESCENTS, _DIPS = 5.0, 31, 6, 3
 """Positive quantities are tried within this factor, others all over their bounds, at so many points; the best of them
 are followed, first so many of those that are lower than their neighbours."""
-_GAINED = 1e-3
 _LINE, _WIDTH, _LOOKED_AT = 41, 0.05, 2
 """Points of the line on which false minima are sought, its half by the box, and the dips that are followed."""
 
@@ -55,11 +54,8 @@ def auto(model: ForwardModel, rng: np.random.Generator, progress: Progress) -> O
         outcome = _elsewhere(model, outcome, progress)
     if swings(model) < _SWINGS or grown > FRACTAL or not np.isfinite(outcome.fitness):
         return outcome
-    near = [(outcome.point, outcome.fitness), *false_minima(model, outcome.point)]
     # What looked like a false minimum may be the true one.
-    (point, fitness), *rest = sorted(near, key=lambda minimum: minimum[1])
-    choice = f"{outcome.choice}; then a look for false minima near by"
-    return replace(outcome, point=point, fitness=fitness, minima=[*outcome.minima, *rest], choice=choice)
+    return outcome.joined(model, false_minima(model, outcome.point), "a false minimum near by")
 
 
 def _first_that_explains(model: ForwardModel, methods: dict[str, Callable[[], Outcome]], reason: str) -> Outcome:
@@ -106,16 +102,12 @@ def _elsewhere(model: ForwardModel, outcome: Outcome, progress: Progress) -> Out
         if len(chosen) <= _DESCENTS and all(np.max((np.abs(point - p) / spacing)[free]) > 1.0 for p in chosen):
             chosen.append(point)
     ends = distinct(model, descend_many(model, np.array(chosen), progress, patience=PATIENCE))
-    rivals = [d for d in ends if d.converged and np.any(differing(model, d.point, outcome.point))]
-    best = min(ends, key=lambda d: d.fitness, default=None)
-    if best is None or best.fitness >= outcome.fitness * (1.0 - _GAINED):
-        return replace(outcome, minima=[*outcome.minima, *((d.point, d.fitness) for d in rivals)])
-    rows = [(len(outcome.iterations) + i, value, mean) for i, value, mean in best.rows]
-    rest = [(outcome.point, outcome.fitness), *outcome.minima, *((d.point, d.fitness) for d in rivals if d is not best)]
     names = ", ".join(model.names[k] for k in np.flatnonzero(free))
-    choice = f"{outcome.choice}; then from other values of {names}"
-    rows = [*outcome.iterations, *rows]
-    return Outcome(best.point, best.fitness, rows, best.message, rest, choice, converged=best.converged)
+    found = outcome.joined(model, ends, f"from other values of {names}")
+    if found.point is outcome.point:
+        return found
+    rows = [(len(outcome.iterations) + i, value, mean) for i, value, mean in ends[0].rows]
+    return replace(found, iterations=[*outcome.iterations, *rows])
 
 
 def _others(model: ForwardModel, point: Array, free: npt.NDArray[np.intp]) -> tuple[Array, Array]:
@@ -168,7 +160,7 @@ def explained(model: ForwardModel, outcome: Outcome) -> bool:
     return bool(left <= max(_UNEXPLAINED * model.rows.signal, _NOISES * noise))
 
 
-def false_minima(model: ForwardModel, point: Array) -> list[tuple[Array, float]]:
+def false_minima(model: ForwardModel, point: Array) -> list[Descent]:
     """Local minima near an answer: where descents end from the dips on a line along the direction the data fix least.
 
     The direction is the last singular vector of the Jacobian in parameters relative to their ranges. One call for the
@@ -186,8 +178,4 @@ def false_minima(model: ForwardModel, point: Array) -> list[tuple[Array, float]]
         return []
     lowest = dips[np.argsort(values[dips])][:_LOOKED_AT]
     descents = descend_many(model, np.clip(line[lowest], model.lower, model.upper))
-    return [
-        (d.point, d.fitness)
-        for d in distinct(model, descents)
-        if d.converged and np.any(differing(model, d.point, point))
-    ]
+    return [d for d in distinct(model, descents) if d.converged]

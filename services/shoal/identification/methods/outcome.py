@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from shoal.findings import Finding
 from shoal.identification.forward import ForwardModel, Progress
-from shoal.identification.methods.lanes import Descent, distinct, history
+from shoal.identification.methods.lanes import Descent, differing, distinct, history
 from shoal.trajectory import Array
 
 
@@ -20,6 +21,7 @@ class Outcome:
     minima: other points where a local search ended, with their fitness
     choice: which method `auto` has taken, and why; ended: whether the method came to its end;
     converged: whether what it ended with is a minimum, as far as it can tell
+    findings: what was found out on the way
     """
 
     point: Array
@@ -30,6 +32,30 @@ class Outcome:
     choice: str = ""
     ended: bool = True
     converged: bool = True
+    findings: list[Finding] = field(default_factory=list)
+
+    def joined(self, model: ForwardModel, ends: Sequence[Descent], where: str) -> Outcome:
+        """Return the outcome with further minima, the best of which is the answer; `where` it was found is its choice.
+
+        A better one lowers the sum of squares by more than the mean square of a row, and so chi-square by more than
+        one, a standard deviation of one parameter. Of equals the answer is the one from the stated starts.
+        """
+        known, apart = [self.point, *(point for point, _ in self.minima)], list[Descent]()
+        for end in sorted(ends, key=lambda one: one.fitness):
+            if np.isfinite(end.fitness) and all(np.any(differing(model, end.point, other)) for other in known):
+                known.append(end.point)
+                apart.append(end)
+        minima = [*self.minima, *((end.point, end.fitness) for end in apart if end.converged)]
+        if not apart or apart[0].fitness >= self.fitness * (1.0 - 1.0 / len(model.rows.time)):
+            return replace(self, minima=minima)
+        return replace(self, minima=minima).moved(apart[0], where)
+
+    def moved(self, better: Descent, where: str) -> Outcome:
+        """Return the outcome at a better minimum; where it was is left as another one."""
+        choice = "; then ".join(part for part in (self.choice, where) if part)
+        minima = [(self.point, self.fitness), *(end for end in self.minima if end[0] is not better.point)]
+        there = replace(self, point=better.point, fitness=better.fitness, minima=minima, choice=choice)
+        return replace(there, message=better.message and "no convergence", converged=better.converged)
 
 
 Method = Callable[[ForwardModel, np.random.Generator, Progress], Outcome]

@@ -9,17 +9,15 @@ samples it is sought anew over growing parts of the record, as the first samples
 
 from __future__ import annotations
 
-from dataclasses import replace
-from functools import partial
 from itertools import islice
 
 import numpy as np
 
 from shoal.identification.forward import ForwardModel
-from shoal.identification.judge.other_starts import turned
-from shoal.identification.judge.rivals import apart, beside_samples, turn_of_samples
+from shoal.identification.judge.minima.other_starts import turned
+from shoal.identification.judge.minima.rivals import apart, beside_samples, turn_of_samples
 from shoal.identification.methods.auto import explained
-from shoal.identification.methods.lanes import descend_many, differentiate_many, distinct, kept_apart
+from shoal.identification.methods.lanes import Descent, descend_many, differentiate_many, distinct
 from shoal.identification.methods.outcome import Outcome
 from shoal.identification.methods.progressive import extend
 from shoal.trajectory import Array
@@ -42,20 +40,13 @@ _FITS = 0.3
 _TURNED = 16
 """Starts by more turns from which an answer that leaves a misfit is sought anew."""
 _PATIENCE = 100.0
-_GAINED = 1e-3
-"""Of the fitness: an alias that fits no better is not the answer, but one beside it."""
 
 
-def with_aliases(model: ForwardModel, outcome: Outcome) -> Outcome:
-    """The outcome with its aliases among the minima; the best of them is the answer. Raises TimeIsUp.
-
-    The runs it takes are not counted: no method is charged for them.
-    """
-    if not np.isfinite(outcome.fitness) or turn_of_samples(model, _UNEVEN) is None:
-        return outcome
-    looking = model.aside()
-    outcome = _faster(looking, outcome)
-    first = _first_part(looking)
+def aliases(model: ForwardModel, outcome: Outcome) -> list[Descent]:
+    """Return the ends of descents from the dips of the misfit over the bounds of each parameter. Raises TimeIsUp."""
+    if turn_of_samples(model, _UNEVEN) is None:
+        return []
+    first = _first_part(model)
     free = ~model.parameters.initial & ~model.parameters.proportional
     dips = [
         _dips(first, outcome.point, k) for k in np.flatnonzero(free).tolist() if _unresolved(first, outcome.point, k)
@@ -67,33 +58,20 @@ def with_aliases(model: ForwardModel, outcome: Outcome) -> Outcome:
         limit = _limit(part, outcome.point)
         good = [d for d in ends if d.fitness <= limit and apart(model, d.point, outcome.point)]
         found = np.array([d.point for d in good])
-        if part is looking:
-            return _beside(model, outcome, [(d.point, d.fitness) for d in good if d.converged])
+        if part is model:
+            return [d for d in good if d.converged]
         end *= 2
-        part = looking if end >= looking.measurement.end else looking.until(end)
-    return outcome
+        part = model if end >= model.measurement.end else model.until(end)
+    return []
 
 
-def _faster(model: ForwardModel, outcome: Outcome) -> Outcome:
-    """The outcome, or one that explains the data better and turns more often, or less, from sample to sample."""
-    starts = [] if explained(model, outcome) else list(islice(turned(model, outcome.point), _TURNED))
-    if not starts:
-        return outcome
-    found = extend(model, np.array(starts), lambda *_: None)
-    return _beside(model, outcome, [(found.point, found.fitness)]) if explained(model, found) else outcome
-
-
-def _beside(model: ForwardModel, outcome: Outcome, ends: list[tuple[Array, float]]) -> Outcome:
-    """The outcome with further minima, the best of which is the answer."""
-    known = [outcome.point, *(point for point, _ in outcome.minima)]
-    kept = kept_apart([*known, *(point for point, _ in ends)], partial(apart, model))
-    new = [one for one in ends if any(one[0] is point for point in kept)]
-    best = min(new, key=lambda end: end[1], default=None)
-    if best is None or best[1] >= outcome.fitness * (1.0 - _GAINED):
-        return replace(outcome, minima=[*outcome.minima, *new])
-    rest = [(outcome.point, outcome.fitness), *outcome.minima, *(one for one in new if one is not best)]
-    choice = "; then ".join(part for part in (outcome.choice, "another frequency between the samples") if part)
-    return replace(outcome, point=best[0], fitness=best[1], minima=rest, choice=choice, converged=True, message="")
+def more_turns(model: ForwardModel, outcome: Outcome) -> list[Descent]:
+    """Return the fit from starts that turn more often, or less, from sample to sample, of data not yet explained."""
+    if turn_of_samples(model, _UNEVEN) is None or explained(model, outcome):
+        return []
+    starts = list(islice(turned(model, outcome.point), _TURNED))
+    found = extend(model, np.array(starts), lambda *_: None) if starts else None
+    return descend_many(model, found.point[None]) if found is not None and explained(model, found) else []
 
 
 def _first_part(model: ForwardModel) -> ForwardModel:

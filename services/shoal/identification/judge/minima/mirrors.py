@@ -10,16 +10,15 @@ is none.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from functools import partial
 from itertools import combinations, product
 
 import numpy as np
 
 from shoal.identification.forward import ForwardModel
-from shoal.identification.judge.other_starts import mirrored, turned, within_bounds
-from shoal.identification.judge.rivals import apart
-from shoal.identification.methods.lanes import descend_many, kept_apart
+from shoal.identification.judge.minima.other_starts import mirrored, turned, within_bounds
+from shoal.identification.judge.minima.rivals import apart
+from shoal.identification.methods.lanes import Descent, descend_many, kept_apart
 from shoal.identification.methods.outcome import Outcome
 from shoal.identification.methods.starts import poses_at
 from shoal.trajectory import Array
@@ -33,38 +32,21 @@ _FITS = 0.3
 """Of the spread of the data: deviation (RMS) of an image that is followed, beyond that of the answer."""
 
 
-def with_mirror_images(model: ForwardModel, outcome: Outcome) -> Outcome:
-    """The outcome with its mirror images among the minima; the best of them is the answer. Raises TimeIsUp.
-
-    The runs it takes are not counted: no method is charged for them.
-    """
-    if not np.isfinite(outcome.fitness):
-        return outcome
-    looking = model.aside()
+def mirror_images(model: ForwardModel, outcome: Outcome) -> list[Descent]:
+    """Return the ends of descents from images that fit about as well as the answer. Raises TimeIsUp."""
     # Where a body turns more often it begins where it does in the answer.
-    more = kept_apart([outcome.point, *turned(looking, outcome.point)], partial(apart, model))[1 : 1 + _SIMULATED]
-    points = np.array([*_alike(looking, outcome.point, images(looking, outcome.point)), *more])
+    more = kept_apart([outcome.point, *turned(model, outcome.point)], partial(apart, model))[1 : 1 + _SIMULATED]
+    points = np.array([*_alike(model, outcome.point, images(model, outcome.point)), *more])
     if not len(points):
-        return outcome
-    values = looking.cost(looking.uncounted(points))
+        return []
+    values = model.cost(model.uncounted(points))
     left = np.sqrt(np.maximum(values - outcome.fitness, 0.0) * model.rows.samples / len(model.rows.time))
     good = [k for k in np.argsort(values, kind="stable") if left[k] < _FITS * model.rows.signal][:_FOLLOWED]
     if not good:
-        return outcome
-    *descents, own = descend_many(looking, np.vstack([points[good], outcome.point]))
+        return []
+    *descents, own = descend_many(model, np.vstack([points[good], outcome.point]))
     # What a descent from the answer itself reaches is no image of it: there the method has not ended.
-    known = [outcome.point, own.point, *(point for point, _ in outcome.minima)]
-    ends = [
-        descent
-        for descent in descents
-        if np.isfinite(descent.fitness) and all(apart(model, descent.point, other) for other in known)
-    ]
-    minima = [*outcome.minima, *((descent.point, descent.fitness) for descent in ends)]
-    best = min(ends, key=lambda descent: descent.fitness, default=None)
-    if best is None or best.fitness >= outcome.fitness:
-        return replace(outcome, minima=minima)
-    minima = [(outcome.point, outcome.fitness), *(end for end in minima if end[0] is not best.point)]
-    return replace(outcome, point=best.point, fitness=best.fitness, minima=minima, converged=best.converged)
+    return [descent for descent in descents if apart(model, descent.point, own.point)]
 
 
 def images(model: ForwardModel, point: Array) -> Array:

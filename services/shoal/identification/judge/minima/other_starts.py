@@ -15,7 +15,7 @@ from itertools import product
 import numpy as np
 
 from shoal.identification.forward import ForwardModel
-from shoal.identification.judge.rivals import turn_of_samples
+from shoal.identification.judge.minima.rivals import turn_of_samples
 from shoal.mechanics.numerics.newton import newton
 from shoal.mechanics.rotation import of_vector, vector_of
 from shoal.scene import RigidBody, Scene
