@@ -127,7 +127,7 @@ def suspects(
     # Clock and gravity explain a free swing equally well: the order of equals is that of their names.
     told = (suspect for suspect in search.found if suspect.after < _CONSTANT * model.rows.signal)
     found = sorted(told, key=lambda s: (float(f"{s.cost(rows):.2e}"), s.name))
-    listed = [suspect for suspect in found if suspect.after <= _FAR * found[0].after]
+    listed = [suspect for suspect in found if suspect.cost(rows) <= _FAR**2 * found[0].cost(rows)]
     refits = {(s.name, s.kind): search.refits[s.name, s.kind] for s in listed if (s.name, s.kind) in search.refits}
     named = [replace(s, alike=search.alike(s.name)) for s in listed]
     return FaultSearch(named, refits, search.better, cut, search.hypotheses)
@@ -191,7 +191,8 @@ class _FaultSearch:
         if not self._explained:
             self._follow()
         self._leave_out([one for one in whole if (one.name, one.kind) in significant])
-        if self._least > _WHOLLY * self.noise:
+        freed = [suspect.after for suspect in self.found if suspect.kind not in SAMPLES]
+        if min([self.before, *freed]) > _WHOLLY * self.noise:
             self._leave_out(stretches(self.model, self.point))
         self._look_back()
 
@@ -407,9 +408,11 @@ class _FaultSearch:
             residual = np.zeros(len(self.residual))
             jacobian = np.zeros((len(residual), len(one.model.names)))
             residual[~one.rows], jacobian[~one.rows] = weight * end.residual, weight[:, None] * end.jacobian
-            tested, count = self.test.left_out(residual, jacobian, one.rows), int(np.sum(one.rows))
-            told = 0.0, misfit(residual[~one.rows]), f"left out, {'it' if one.kind == 'recording' else 'they'}"
-            self._note(one.name, one.kind, count, tested, self.tests * one.windows, told, misfit(residual))
+            left, count = misfit(residual[~one.rows]), int(np.sum(one.rows))
+            told = 0.0, left, f"left out, {'it' if one.kind == 'recording' else 'they'}"
+            residual[~one.rows] -= (self.residual - self.test.residual)[~one.rows]
+            tested = self.test.left_out(residual, jacobian, one.rows)
+            self._note(one.name, one.kind, count, tested, self.tests * one.windows, told, left)
 
     def _read(self) -> None:
         """Fit the readings that begin best, each from its own starts; misfits count against the spread of the data."""
