@@ -35,7 +35,7 @@ class Estimate:
     choice: which method was taken, and why; notes: what was found and mended in the recordings
     findings: what was found out about the answer, the decisive first
     suspects: what was taken as known and would explain a misfit if it were freed
-    hypotheses: score tests of all that was taken as known, the most significant first
+    hypotheses: tests of all that was taken as known, the most significant first, then the other minima
     minima: others that were found, by their parameters, the best first
     sensitivity_doubt: relative difference of derivatives by two step sizes
     profiles, bootstrap, posterior: where wished for

@@ -46,7 +46,8 @@ _ZERO = 1e-9
 class Hypothesis:
     """A row of the table: something taken as known that may be wrong.
 
-    name, kind: those of the suspect it may become; numbers: how many are freed with it
+    name, kind: those of the suspect it may become; numbers: how many are freed with it, or are left out
+    Another minimum is a row as well, of kind `minimum`, that frees nothing.
     drop: of chi-square, in units of the variance of the noise, correlated as it is
     chance: p-value of the drop, by F; corrected: for all rows of the table
     explained: share of the mean square of the residual that goes with it

@@ -13,7 +13,7 @@ from shoal.identification.deadline import TimeIsUp
 from shoal.identification.findings import Verdict, verdict_of
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.hypotheses import SAMPLES, Hypothesis, ScoreTest
-from shoal.identification.judge.minima.rivals import ALIAS, relation, rivals_of, within
+from shoal.identification.judge.minima.rivals import ALIAS, relation, rivals_of, rows_of, within
 from shoal.identification.judge.residual_tests import ResidualTests, residual_tests
 from shoal.identification.judge.stationarity import downhill, sentence
 from shoal.identification.judge.suspects import FaultSearch, Suspect, suspects
@@ -44,7 +44,7 @@ class Judgement:
     suspects: what was taken as known and would lower a misfit if it were freed, the best first
     refits: fits with what would explain a misfit that is not held against the model; the intervals hold them too
     better: a minimum that fits better, if the search for suspects met one: go on from there
-    hypotheses: the score tests of what was taken as known, the most significant first
+    hypotheses: the tests of what was taken as known, the most significant first, then the other minima
     """
 
     findings: list[Finding] = field(default_factory=list)
@@ -91,7 +91,8 @@ def judge(
         at_answer = outcome.point, seen.residual, seen.jacobian, tests.explained
         looked = suspects(model, *at_answer, test=test, misfit=misfitting)
     judged = _by_findings(model, outcome, seen, at, tests, parameters, unknown, looked, misfitting)
-    return replace(judged, suspects=looked.suspects, hypotheses=looked.hypotheses)
+    hypotheses = [*looked.hypotheses, *rows_of(model, outcome, at)]
+    return replace(judged, suspects=looked.suspects, hypotheses=hypotheses)
 
 
 def _by_findings(

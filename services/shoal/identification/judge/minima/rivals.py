@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 
 from shoal.identification.forward import ForwardModel
+from shoal.identification.judge.hypotheses import Hypothesis
 from shoal.identification.methods.lanes import UNDAMPED, damped_step, differentiate_many, differing, kept_apart
 from shoal.identification.methods.outcome import Outcome
 from shoal.identification.spread.chances import chi_square_above
@@ -39,11 +40,30 @@ def rivals_of(model: ForwardModel, outcome: Outcome, at: Linearisation) -> list[
 
 def as_good(model: ForwardModel, outcome: Outcome, at: Linearisation) -> float:
     """Up to which fitness another point explains the data as well as the answer, as far as the noise can tell."""
-    # Of the sum of squares; correlated noise makes larger differences by chance.
-    chance = max(seen.variance / seen.independent(1) for seen in at.noise)
-    doubt = chi_square_above(len(outcome.point), 1.0 - LEVEL) * chance / model.rows.samples
+    doubt = chi_square_above(len(outcome.point), 1.0 - LEVEL) * _unit(at) / model.rows.samples
     least = max(outcome.fitness, model.rows.things * (model.rows.noise or 0.0) ** 2)
     return outcome.fitness + min(doubt, 0.5 * least) + 1e-18
+
+
+def rows_of(model: ForwardModel, outcome: Outcome, at: Linearisation) -> list[Hypothesis]:
+    """Return a row of the table of hypotheses for each other minimum, the best first.
+
+    It frees nothing, so that no p-value decides: chi-square drops by a negative number, and one above minus the
+    quantile of the joint confidence region (see `as_good`) fits as well.
+    """
+    rows, unit = list[Hypothesis](), max(_unit(at) / model.rows.samples, 1e-300)
+    for point, fitness in sorted(outcome.minima, key=lambda end: end[1]):
+        if np.isfinite(fitness):
+            values = zip(model.names, model.parameters.to_values(point), strict=True)
+            name = ", ".join(f"{name} = {value:.4g}" for name, value in values)
+            drop, share = (outcome.fitness - fitness) / unit, 1.0 - fitness / max(outcome.fitness, 1e-300)
+            rows.append(Hypothesis(name, "minimum", 0, drop, 1.0, 1.0, share, fitted=True))
+    return rows
+
+
+def _unit(at: Linearisation) -> float:
+    """The mean square by which differences of a sum of squares are chi-square; correlated noise makes it larger."""
+    return max(seen.variance / seen.independent(1) for seen in at.noise)
 
 
 def valley(model: ForwardModel, outcome: Outcome, at: Linearisation) -> tuple[Outcome, list[Array]]:

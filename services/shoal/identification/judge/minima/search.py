@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -31,7 +32,7 @@ def with_other_minima(model: ForwardModel, outcome: Outcome) -> Outcome:
     The runs are not counted: no method is charged for them.
     """
     for name, search in SEARCHES.items() if np.isfinite(outcome.fitness) else ():
-        ends = unless_late(lambda search=search, so_far=outcome: search(model.aside(), so_far), [])  # type: ignore[misc]
+        ends: Sequence[Descent] = unless_late(partial(search, model.aside(), outcome), [])
         outcome = followed(model, outcome, ends, name)
     return outcome
 

@@ -42,7 +42,8 @@ class LeftOut:
     def place(self, whole: ForwardModel, point: Array) -> Array:
         """Return a point of the whole model (parameters,) as one of the model without these samples."""
         known = dict(zip(whole.names, point, strict=True))
-        return np.clip(np.array([known[name] for name in self.model.names]), self.model.lower, self.model.upper)
+        there = np.array([known[name] for name in self.model.names])
+        return np.asarray(np.clip(there, self.model.lower, self.model.upper))
 
 
 def recordings(model: ForwardModel) -> Iterator[LeftOut]:
