@@ -207,7 +207,7 @@ def test_at_whatever_look_the_time_ends_the_answer_has_a_status(
 
 def test_time_that_ends_while_an_answer_is_written_up_is_no_traceback(monkeypatch: pytest.MonkeyPatch) -> None:
     """Wherever that is: what needs no further run is the answer."""
-    module = import_module("shoal.identification.conclude")
+    module = import_module("shoal.identification.surroundings")
     combinations = module.combinations
 
     def late(model: Any, *rest: Any) -> Any:
