@@ -84,6 +84,7 @@ def test_a_study_is_of_one_problem(several: Answer, flexible: Answer) -> None:
         study({"one": several, "other": flexible})
 
 
+@pytest.mark.slow
 def test_a_tolerance_shows_why_this_model() -> None:
     problem = load_problem("paper-case-1")
     answer = Answer(problem, identify(problem, tolerance=1e-2))

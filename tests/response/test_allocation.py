@@ -115,7 +115,14 @@ def allocated(vary: dict[str, Any], limit: str, target: float, **how: Any) -> Al
     return found.allocation
 
 
-@pytest.mark.parametrize(("rho", "costs"), [(0.8, (1.0, 3.0)), (0.95, (1.0, 3.0)), (-0.9, (1.0, 1.0))])
+@pytest.mark.parametrize(
+    ("rho", "costs"),
+    [
+        pytest.param(0.8, (1.0, 3.0), marks=pytest.mark.slow),
+        pytest.param(0.95, (1.0, 3.0), marks=pytest.mark.slow),
+        (-0.9, (1.0, 1.0)),
+    ],
+)
 def test_deviations_of_correlated_parameters(rho: float, costs: tuple[float, float]) -> None:
     """The deviation of h + v / 2 is sqrt(w' R w), w those of its parts: the cheapest ones by a general optimiser.
 

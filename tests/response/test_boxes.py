@@ -213,6 +213,7 @@ def study(vary: dict[str, object], limit: str, times: list[float]) -> Response:
     return uncertain(Scene.parse(THROWN), vary, times, limit=[limit], limit_runs=2000, verify=False, seed=2)
 
 
+@pytest.mark.slow
 def test_a_linear_limit_with_an_interval_mean() -> None:
     """y = h + v t - 5 t^2 at t = 0.5, v normal(5, 0.3), h in [-0.05, 0.1]: P(y > 1.7) = Phi((h - 0.45) / 0.15)."""
     found = study({UP: "normal(5,0.3)", HEIGHT: (-0.05, 0.1)}, "P.y > 1.7", [0.5])
@@ -235,6 +236,7 @@ def test_a_linear_limit_with_an_interval_mean() -> None:
     assert statistics["std_upper"] == pytest.approx([0.15])
 
 
+@pytest.mark.slow
 def test_the_least_probability_inside_an_interval() -> None:
     """|a + 0.5 u| > 0.9, u normal(0, 0.6), a in [-0.2, 0.35]: both tails, least at a = 0, largest at a = 0.35."""
     found = study({ALONG: "normal(0,0.6)", ASIDE: (-0.2, 0.35)}, "abs(P.x) > 0.9", [0.5])

@@ -20,7 +20,7 @@ from sliding import puck
 
 
 @pytest.mark.parametrize("method", ["auto", "chebyshev", "legendre"])
-@pytest.mark.parametrize("count", [1, 2, 3])
+@pytest.mark.parametrize("count", [1, 2, pytest.param(3, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
     ("place", "share"),
     [(0.31, 0.06), *(pytest.param(*one, marks=pytest.mark.slow) for one in ((-0.72, 0.05), (0.38, 0.12)))],

@@ -45,7 +45,12 @@ def worst(text: str, angle: float) -> float:
 
 
 @pytest.mark.parametrize(
-    ("text", "kept"), [("O.force > 12", False), ("O.force > 13", True), ("O.fy < -0.5", True), ("abs(O.fx) > 4", False)]
+    ("text", "kept"),
+    [
+        ("O.force > 12", False),
+        ("O.force > 13", True),
+        *(pytest.param(*one, marks=pytest.mark.slow) for one in (("O.fy < -0.5", True), ("abs(O.fx) > 4", False))),
+    ],
 )
 def test_forces_in_a_joint_with_intervals(text: str, kept: bool) -> None:
     """The least margin is that of the closed form over a dense scan of the angle."""
@@ -124,6 +129,7 @@ def test_energies_of_an_oscillator() -> None:
         assert found.ok, text
 
 
+@pytest.mark.slow
 def test_energies_of_a_torsion_spring_that_is_wound_up() -> None:
     """Turned once and a quarter, 1/2 k (5 pi / 2)^2, and what its motion has of it, whole turns counted."""
     found = uncertain(

@@ -57,7 +57,8 @@ def test_a_wrong_sense_and_exchanged_columns_are_named(
     assert "seek it as a parameter" not in estimate.advice[0]
 
 
-@pytest.mark.parametrize("noise", ["", pytest.param(f"noise: {NOISE}\n", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("noise", ["", f"noise: {NOISE}\n"])
 def test_outliers_that_a_robust_loss_sets_aside_refute_no_model(noise: str, tmp_path: Path) -> None:
     table = recorded()
     table[5::17, 1] += 1.5
