@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,6 +58,23 @@ def start_of(scene: Scene, poses: dict[str, InitialPose], at: Attachment) -> Arr
     """Return the position of an attachment at the start [m], (2,)."""
     place = complex(place_of(scene, at))
     return poses[owner(at)].position((place.real, place.imag))
+
+
+def hanging(scene: Scene, engine: str) -> Iterator[tuple[str, Attachment, Attachment]]:
+    """Yield the joints of open chains from the ground outwards, each with its places on the parent and on the child.
+
+    engine: that refuses a scene with other bodies. Raises InputError.
+    """
+    reached, waiting = {GROUND}, {name: (joint.first, joint.second) for name, joint in scene.joints.items()}  # type: ignore[union-attr]
+    while found := [name for name, sides in waiting.items() if any(side.body in reached for side in sides)]:
+        for name in found:
+            first, second = waiting.pop(name)
+            parent, child = (first, second) if first.body in reached else (second, first)
+            reached.add(child.body)
+            yield name, parent, child
+    for name in scene.bodies:
+        if name not in reached:
+            raise InputError(f"bodies.{name}: engine {engine} needs a chain of joints from the ground; use gauss")
 
 
 def initial_poses(scene: Scene) -> dict[str, InitialPose]:

@@ -7,7 +7,7 @@ hangs on its parent its position is an expression in the parent's coordinates, s
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,8 +17,8 @@ import numpy as np
 from shoal.engines.capabilities import of_kind
 from shoal.engines.casadi.bodies import PlacedBody, PlacedCable, PlacedRigid, cable_place, turned
 from shoal.engines.casadi.element import cable_element
-from shoal.errors import InputError
-from shoal.scene import GROUND, Attachment, PointMass, Revolute, RigidBody, Rod, Scene
+from shoal.engines.poses import hanging
+from shoal.scene import GROUND, PointMass, RigidBody, Rod, Scene
 from shoal.scene.record import Vector
 
 
@@ -54,7 +54,7 @@ def build_tree(scene: Scene) -> PlacedTree:
     angles = {name: ca.SX.sym(f"{name}_start") for name in scene.bodies}
     coordinates: list[Any] = []
     start: list[Any] = []
-    for parent, child in _links(scene):
+    for _, parent, child in hanging(scene, "casadi"):
         outer, inner, name = scene.location(parent), scene.location(child), child.body
         body, angle = scene.bodies[name], angles[name]
         straight[name] = rest = PlacedRigid(straight[parent.body].point(outer) - turned(angle, inner), angle)
@@ -76,21 +76,6 @@ def build_tree(scene: Scene) -> PlacedTree:
         root=root,
         length=length,
     )
-
-
-def _links(scene: Scene) -> Iterator[tuple[Attachment, Attachment]]:
-    """Joints from the ground outwards, each as (place on the parent, place on the child)."""
-    reached, waiting = {GROUND}, dict(scene.joints)
-    while waiting:
-        for name, joint in list(waiting.items()):
-            if not isinstance(joint, Revolute):
-                raise InputError(f"joints.{name}: engine casadi cannot do {joint.kind}")
-            known = [side.body in reached for side in (joint.first, joint.second)]
-            if any(known):
-                parent, child = (joint.first, joint.second) if known[0] else (joint.second, joint.first)
-                waiting.pop(name)
-                reached.add(child.body)
-                yield parent, child
 
 
 def _place_rigid(

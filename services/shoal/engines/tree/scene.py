@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from shoal.engines.poses import initial_poses
+from shoal.engines.poses import hanging, initial_poses
 from shoal.engines.tree.tree import COORDINATES, FIXED, PRISMATIC, RATES, REVOLUTE, SPHERICAL, Tree
 from shoal.errors import InputError
 from shoal.mechanics.assembly.masses import second_moments
@@ -53,7 +53,7 @@ class SceneTree:
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
         self._begin, self._axis, self.initial = started(scene)
-        links = _links(scene)
+        links = list(hanging(scene, "tree"))
         self.rows = {GROUND: 0} | {child.body: row for row, (_, _, child) in enumerate(links, start=1)}
         count = len(self.rows)
         # Of the moved frames at the start: their origins, and their axes as columns.
@@ -195,24 +195,3 @@ def started(scene: Scene) -> tuple[dict[str, BodyStart], Any, dict[str, InitialS
         return np.asarray(found[side.body].axes @ placement.attitudes.image(side.body, axis)[:, 0])
 
     return found, pointing, initial
-
-
-def _links(scene: Scene) -> list[tuple[str, Attachment, Attachment]]:
-    """Joints from the ground outwards, each with its places on the parent and on the child. Raises InputError."""
-    reached, waiting, found = {GROUND}, dict(scene.joints), []
-    while waiting:
-        before = len(waiting)
-        for name, joint in list(waiting.items()):
-            first, second = joint.first, joint.second  # type: ignore[union-attr]
-            if (first.body in reached) == (second.body in reached):
-                continue
-            parent, child = (first, second) if first.body in reached else (second, first)
-            waiting.pop(name)
-            reached.add(child.body)
-            found.append((name, parent, child))
-        if len(waiting) == before:
-            break
-    for name in scene.bodies:
-        if name not in reached:
-            raise InputError(f"bodies.{name}: engine tree needs a chain of joints from the ground; use gauss")
-    return found
