@@ -1,7 +1,8 @@
 """Constraints that are at most quadratic in the coordinates: C = sum of factor u w + c + f(p), one kernel for all.
 
 Gears are the exception, C = sum of share * angle + c but for multiples of a period, as their teeth have no numbers. As
-the vectors d of the angles are of unit length, C_q is linear in d all the same, (-d_y, d_x), and there is no bias.
+the vectors d of the angles are of unit length, C_q is linear in d all the same, (-d_y, d_x), and there is no bias; of
+d3C/dt3 = d' x d'' + d x d''' the first term, the cube of the rate, counts once and not three times.
 
 u and w are rows of the state: unknowns, or components of vectors that are affine in them. As differences of points
 are formed before they are multiplied, the round-off of C does not grow with the distance from the origin. C_q, the
@@ -108,6 +109,21 @@ def curvature(constraints: Constraints, drives: Functions, k: int, t: float, one
         return 0.0
     bend = by_drive(constraints.way[k], functions.evaluate(drives, number, t, 0), 2)
     return bend * functions.evaluate(drives, number, t, one) * functions.evaluate(drives, number, t, other)  # type: ignore[no-any-return]
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def third_derivative(
+    tile: Tile, constraints: Constraints, drives: Functions, k: int, t: float, z: Array, zdot: Array, lane: int
+) -> float:
+    """Return a third of d3C/dt3 of constraint k in one lane, but for C_qq v a and what vanishes in singular positions.
+
+    That are products of C_q, C_p and C_ppp, as C_ppp = -C_p or 0. The derived rows of z and zdot must be filled.
+    """
+    width, total = len(tile), curvature(constraints, drives, k, t, 1, 2)
+    for r in range(constraints.turned[k], constraints.turned[k + 1]):
+        x, y = constraints.rising[r] * width + lane, (constraints.rising[r] + 1) * width + lane
+        total -= constraints.share[r * width + lane] * (z[x] * zdot[y] - z[y] * zdot[x]) ** 3 * (2.0 / 3.0)
+    return total  # type: ignore[no-any-return]
 
 
 @njit(cache=True, error_model="numpy")

@@ -10,7 +10,7 @@ of the bivector G = S k + M it is, by p and p, by p and c, and by c and c,
     S (p c' - B 1)/A^2 + 2 p h'/A^2 + M/A,        S (1 - p p'/A)/A,
 
 where M stands for the skew matrix of M . (e_m ^ e_n). Damping of the curvature has the products of gradients alone, M =
-0 above; in space those of the size of k.
+0 above; in space those of the size of k (`strain.bend`).
 """
 
 from __future__ import annotations
@@ -129,10 +129,19 @@ def _bent(viscous, p, c, relaxed, angle, bending):  # type: ignore[no-untyped-de
     flat, stiffness = 1.0 / dot(p, p), bending * relaxed
     k, firm = times(flat, wedge(p, c)), stiffness * flat * flat
     if viscous and len(k) > 1:
+        square = dot(k, k) + STRAIGHT
         by_p, by_c = minus(facing(c, k), times(2.0 * dot(k, k), p)), times(-1.0, facing(p, k))
-        u, v = times(firm / (dot(k, k) + STRAIGHT), by_p), times(firm / (dot(k, k) + STRAIGHT), by_c)
-        return outer(u, by_p), outer(u, by_c), outer(v, by_c)
+        u, v = times(firm / square, by_p), times(firm / square, by_c)
+        whole, mixed, last = _turned(p, c, k, flat, stiffness * (STRAIGHT / square), zeros_like(k))
+        return plus(outer(u, by_p), 1.0, whole), plus(outer(u, by_c), 1.0, mixed), plus(outer(v, by_c), 1.0, last)
     moment = zeros_like(k) if viscous else times(stiffness, less(k, angle))
+    return _turned(p, c, k, flat, stiffness, moment)
+
+
+@njit(error_model="numpy", forceinline=True)
+def _turned(p, c, k, flat, stiffness, moment):  # type: ignore[no-untyped-def]
+    """The products of gradients of the turn k, times the stiffness, and its second derivatives times the moment."""
+    firm = stiffness * flat * flat
     both, turned = plus(moment, stiffness, k), dot(moment, k)
     g, h = times(2.0 * flat * flat, facing(c, both)), times(2.0 * flat * flat, facing(p, both))
     q = minus(times(flat * flat * (4.0 * stiffness * dot(k, k) + 8.0 * turned), p), g)

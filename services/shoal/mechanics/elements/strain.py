@@ -8,8 +8,8 @@ from shoal.compile.simd import EIGHT, spread
 from shoal.mechanics.elements.batch import rest
 from shoal.mechanics.numerics.tuples import dot, minus, plus, times
 
-STRAIGHT = 1e-16
-"""Curvature times length of an element, squared, that counts as none: a rounding error of a straight element's."""
+STRAIGHT = 1.5e-8
+"""Curvature times length of an element, squared, at which half of a turn of its plane is damped: the root of eps."""
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -39,16 +39,20 @@ def less(turn, angle):  # type: ignore[no-untyped-def]
 def bend(damped, flat, k, rate, change, relaxed, angle, stiffness, eta, straight):  # type: ignore[no-untyped-def]
     """The moment over |r'|^2 at a point, its turn, and the power lost; flat: 1/|r'|^2, k: r' ^ L r'', change: its rate.
 
-    In space only the rate of the size of the turn is damped: without a frame of the section, a turn whose plane changes
-    is not distinguished from a rigid rotation. straight: `STRAIGHT` in the units of the turn.
+    In space the rate of the size of the turn is damped, and of a straight element that of the turn: without a frame of
+    the section, a turn whose plane changes is not distinguished from a rigid rotation. The plane of a straight element
+    is round-off, which the first rate alone would amplify as the turn passes zero. straight: `STRAIGHT` in the units of
+    the turn.
     """
     stiffness = stiffness * relaxed
     turn = times(flat, k)
     bent, lost = less(turn, angle), 0.0 * flat
     if damped:
         turning = times(flat, minus(change, times(2.0 * rate, turn)))
+        resisted = turning
         if len(turn) > 1:
-            turning = times(dot(turn, turning) / (dot(turn, turn) + straight), turn)
-        bent = plus(bent, eta, turning)
-        lost = eta * stiffness * dot(turning, turning)
+            square = dot(turn, turn) + straight
+            resisted = plus(times(dot(turn, turning) / square, turn), straight / square, turning)
+        bent = plus(bent, eta, resisted)
+        lost = eta * stiffness * dot(turning, resisted)
     return times(stiffness * flat, bent), turn, lost

@@ -4,9 +4,9 @@ At a singular position combinations u of constraints vanish (u' C_q = 0) and res
 Drives p(t) are coordinates as q is, so that all derivatives are those of the geometry C(q, p) of the machine. For
 constraints that are quadratic in q, velocities satisfy u' (C_qq v v + C_pp p' p') = 0, the tangent cone of the
 configuration space: one line for each branch of a linkage that crosses there. The acceleration then satisfies
-u' C_qq x a = -u' C_pp p' p'', a linear row, with the tangent x = v. Along a branch all derivatives by time have its
-direction to lowest order, so that rows hold near the singular position however slowly a motion begins. Rows of
-constraints that are redundant everywhere vanish.
+u' C_qq x a = -u' C_pp p' p'', a linear row, with the tangent x = v; gears add to its right side. Along a branch all
+derivatives by time have its direction to lowest order, so that rows hold near the singular position however slowly a
+motion begins. Rows of constraints that are redundant everywhere vanish.
 
 The velocity satisfies the cone up to round-off and truncation only. Near rest round-off is all of it, and the rows of
 such a velocity would leave the machine no acceleration at all. So v is first projected onto the cone (Gauss-Newton on
@@ -103,6 +103,7 @@ def follow(
     w: GaussWork,
     s: LaneWork,
     t: float,
+    q: Array,
     v: Array,
     forces: Array,
     lane: int,
@@ -125,18 +126,18 @@ def follow(
     if speed > 0.0:
         for k in range(m.constraints.size):
             s.shift[k] = 0.0
-        rank, off = _rows(tile, m, w, s, t, lane, first, velocity, approaching, s.shift)
+        rank, off = _rows(tile, m, w, s, t, q, lane, first, velocity, approaching, s.shift)
         if rank == first and off <= ON_CONE:
             return first, False  # redundant everywhere
         _meet(tile, m, w, s, t, lane, first)
-        rank, off = _approach(tile, m, w, s, t, lane, first, velocity)
+        rank, off = _approach(tile, m, w, s, t, q, lane, first, velocity)
         away = _difference(width, n, lane, w.branch, v)
         if off > ON_CONE or away > AWAY * speed:
             _accelerate(tile, m, w, s, forces, lane, first)
             if speed * speed < tolerance * _largest(width, n, lane, w.extra):
                 speed = 0.0
         if speed > 0.0:
-            rank, _ = _rows(tile, m, w, s, t, lane, first, velocity, not approaching, s.wanted)
+            rank, _ = _rows(tile, m, w, s, t, q, lane, first, velocity, not approaching, s.wanted)
             return rank, False
     _accelerate(tile, m, w, s, forces, lane, first)
     size = _largest(width, n, lane, w.extra)
@@ -154,7 +155,7 @@ def follow(
             share = (FAR if seed < n else -FAR) * size / free if free > 0.0 else 0.0
             for i in range(n):
                 w.extra[i * width + lane] = w.branch[i * width + lane] + share * w.extra[i * width + lane]
-        rank, off = _settle(tile, m, w, s, t, forces, lane, first, 0.0 if driven else SLOWEST * size)
+        rank, off = _settle(tile, m, w, s, t, q, forces, lane, first, 0.0 if driven else SLOWEST * size)
         if off <= ON_CONE:
             return rank, False
     return first, True
@@ -167,6 +168,7 @@ def _settle(
     w: GaussWork,
     s: LaneWork,
     t: float,
+    q: Array,
     forces: Array,
     lane: int,
     first: int,
@@ -181,10 +183,10 @@ def _settle(
     for _ in range(ROUNDS):
         for i in range(n):
             w.branch[i * width + lane] = w.extra[i * width + lane]
-        rank, off = _approach(tile, m, w, s, t, lane, first, order)
+        rank, off = _approach(tile, m, w, s, t, q, lane, first, order)
         if off > ON_CONE:
             break
-        rank, _ = _rows(tile, m, w, s, t, lane, first, order, np.bool_(False), s.wanted)
+        rank, _ = _rows(tile, m, w, s, t, q, lane, first, order, np.bool_(False), s.wanted)
         _accelerate(tile, m, w, s, forces, lane, rank)
         size = _largest(width, n, lane, w.extra)
         if not size > least:
@@ -222,7 +224,7 @@ def _meet(tile: Tile, m: Arrays, w: GaussWork, s: LaneWork, t: float, lane: int,
 
 @njit(cache=True, error_model="numpy")
 def _approach(
-    tile: Tile, m: Arrays, w: GaussWork, s: LaneWork, t: float, lane: int, first: int, order: int
+    tile: Tile, m: Arrays, w: GaussWork, s: LaneWork, t: float, q: Array, lane: int, first: int, order: int
 ) -> tuple[int, float]:
     """Project the tangent in w.branch onto the cone; returns the rank with its rows, and the distance from the cone."""
     width, n = len(tile), m.unknowns
@@ -231,7 +233,7 @@ def _approach(
         for k in range(m.constraints.size):
             s.shift[k] = 0.0
         before = off
-        rank, off = _rows(tile, m, w, s, t, lane, first, order, np.bool_(True), s.shift)
+        rank, off = _rows(tile, m, w, s, t, q, lane, first, order, np.bool_(True), s.shift)
         if rank == first or off <= ROUND_OFF or (number > 0 and off <= projection.NEW and off > 0.1 * before):
             break
         _combine(tile, m, w, s, lane, first, rank, s.shift)
@@ -249,6 +251,7 @@ def _rows(
     w: GaussWork,
     s: LaneWork,
     t: float,
+    q: Array,
     lane: int,
     first: int,
     order: int,
@@ -275,7 +278,7 @@ def _rows(
         bend, kick = 0.0, 0.0
         for k in range(count):
             bend += s.weights[k] * constraints.curvature(c, m.functions, k, t, order, order)
-            kick += s.weights[k] * constraints.curvature(c, m.functions, k, t, VELOCITY, ACCELERATION)
+            kick += s.weights[k] * constraints.third_derivative(tile, c, m.functions, k, t, q, w.branch, lane)
         crossing.turn(tile, m, w, s.weights, lane, w.extra)
         pace = constraints.pace(tile, c, s.weights, w.branch, lane)
         if not _largest(width, n, lane, w.extra) > STILL * pace:

@@ -141,7 +141,7 @@ def _add_dropped(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Arr
                     continue
             else:
                 for j in range(count):
-                    gap -= weights[j] * constraints.curvature(c, m.functions, j, t, 1, 2)
+                    gap -= weights[j] * constraints.third_derivative(tile, c, m.functions, j, t, q, v, lane)
             for i in range(n):
                 gap -= rows[rank, i] * a[i * width + lane]
             gap /= dot(rows[rank], moves[rank])

@@ -108,7 +108,7 @@ def constrain(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array,
             locked = False
             if rank < count:
                 turned = False
-                rank, locked = branch.follow(tile, m, w, s, t, v, a, lane, rank, tolerance)
+                rank, locked = branch.follow(tile, m, w, s, t, q, v, a, lane, rank, tolerance)
                 w.near[lane] = HERE if locked or rank > first else w.near[lane]
             distance = s.triangle[first - 1, first - 1] if first > 0 else 1.0
             if w.near[lane] == HERE:
