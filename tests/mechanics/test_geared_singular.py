@@ -79,10 +79,12 @@ class Geared(NamedTuple):
         """Return the machine in the plane or in space."""
         rest = [0.0] * (dimensions - 1)
         ground: dict[str, Any] = {"body": "ground", "point": [0.0, *rest]}
-        bodies, joints, initial = {}, {}, {}
+        bodies: dict[str, Any] = {}
+        joints: dict[str, Any] = {}
+        initial: dict[str, Any] = {}
         last = ground
         rates, _ = self.moving(0.0)
-        axis = {"axis": [0.0, 0.0, 1.0]} if dimensions == 3 else {}
+        axis: dict[str, Any] = {"axis": [0.0, 0.0, 1.0]} if dimensions == 3 else {}
         for name, mass, inertia, length, angle, rate in zip(
             "xyz", self.masses, self.inertias, self.lengths, self.angles, rates, strict=True
         ):

@@ -62,6 +62,8 @@ GROWTH = 4.0
 """Largest ratio of the numbers of steps until one return and until the next."""
 CREEPING = 10.0
 """So much faster than now a run may become that is not given up: steps are a sixth of the next ones at most."""
+SHARE = 0.01
+"""The part of its steps over which a run is judged: a few are short wherever a singular position is passed."""
 LOBATTO = 0.5 - 0.5 / np.sqrt(5.0)
 """Inner node of the four-point Lobatto rule on the unit interval, of order 6; its weights are 1/12 and 5/12."""
 
@@ -101,10 +103,11 @@ class March:
             if (stop is not None and stop.is_set()) or not threading.main_thread().is_alive():
                 raise KeyboardInterrupt
             now = progress[NOW], progress[NUMBER]
-            creeping, before = self._creeps(*before, *now), now
-            if creeping and slow:
-                return
-            slow = creeping
+            if now[1] - before[1] >= SHARE * self.frame.steps:
+                creeping, before = self._creeps(*before, *now), now
+                if creeping and slow:
+                    return
+                slow = creeping
             steps = progress[ROOM] * min(GROWTH, PAUSE / (time.perf_counter() - begin))
 
     def _creeps(self, begin: float, first: float, now: float, number: float) -> bool:
