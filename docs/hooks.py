@@ -6,7 +6,6 @@ import ast
 import inspect
 import re
 import textwrap
-from collections.abc import Iterator
 from html import unescape
 from types import ModuleType
 from typing import Any, Literal, get_args, get_origin
@@ -37,18 +36,22 @@ def on_page_content(html: str, **_: Any) -> str:
         display = "block" if found["tag"] == "div" else "inline"
         return str(convert(unescape(found["tex"]), display=display))
 
-    return re.sub(r'<(?P<tag>span|div) class="arithmatex">\\[(\[](?P<tex>.*?)\\[)\]]</(?P=tag)>', formula, html, flags=re.DOTALL)
+    return re.sub(
+        r'<(?P<tag>span|div) class="arithmatex">\\[(\[](?P<tex>.*?)\\[)\]]</(?P=tag)>', formula, html, flags=re.DOTALL
+    )
 
 
 def findings() -> str:
     """Return the tables of all kinds of findings, one for each analysis."""
     from shoal.identification import findings as identification
+    from shoal.mechanics.analysis import findings as statics
     from shoal.response import findings as response
 
     return "\n\n".join(
         [
             f"## Identification\n\n{_kinds(identification, 'verdict')}",
             f"## Uncertain parameters\n\n{_kinds(response, 'status')}",
+            f"## Statics\n\n{_kinds(statics, 'status')}",
         ]
     )
 

@@ -21,7 +21,7 @@ from shoal_flows.verdicts import verdict
 def log_statics(found: Equilibrium, picture: bytes) -> str:
     """One run; returns its id. picture: of the machine at rest"""
     scene = found.scene
-    tags = {"kind": "statics", "scene": scene.name}
+    tags = {"kind": "statics", "scene": scene.name, "findings": ", ".join(found.codes)}
     with open_run("Statics", f"{scene.name} · statics", description=scene.description, tags=tags) as run:
         run.judge(*verdict(found))
         run.params({**stated(scene), "time": found.time})

@@ -14,7 +14,7 @@ from scipy.integrate import solve_bvp
 from shoal.cli import main
 from shoal.errors import InputError
 from shoal.mechanics.analysis import settled as module
-from shoal.mechanics.analysis.equilibrium import EquilibriumStatus
+from shoal.mechanics.analysis.findings import EquilibriumStatus
 from shoal.mechanics.analysis.settled import settled
 from shoal.scene import Scene
 

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 from shoal.cli import main
 from shoal.errors import ComputationError
 from shoal.mechanics.analysis.damped import roots
-from shoal.mechanics.analysis.equilibrium import EquilibriumStatus
+from shoal.mechanics.analysis.findings import EquilibriumStatus
 from shoal.mechanics.analysis.mesh_error import of_modes
 from shoal.mechanics.analysis.modes import modes
 from shoal.mechanics.analysis.small_motions import ROUND, BoundedMatrix, hides, spectrum

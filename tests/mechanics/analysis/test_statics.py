@@ -12,7 +12,8 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.special import ellipeinc, ellipk, ellipkinc
 from shoal.cli import main
-from shoal.mechanics.analysis.equilibrium import Equilibrium, EquilibriumStatus
+from shoal.mechanics.analysis.equilibrium import Equilibrium
+from shoal.mechanics.analysis.findings import EquilibriumStatus
 from shoal.mechanics.analysis.statics import statics
 from shoal.scene import Scene, load_scene
 

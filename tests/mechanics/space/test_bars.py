@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from shoal import statics
-from shoal.mechanics.analysis.equilibrium import EquilibriumStatus
+from shoal.mechanics.analysis.findings import EquilibriumStatus
 from shoal.scene import Scene
 
 GRAVITY = 9.81

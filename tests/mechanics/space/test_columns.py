@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
-from shoal.mechanics.analysis.equilibrium import EquilibriumStatus
+from shoal.mechanics.analysis.findings import EquilibriumStatus
 from shoal.mechanics.analysis.statics import statics
 from shoal.scene import Scene
 

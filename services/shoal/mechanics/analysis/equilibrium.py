@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from enum import StrEnum
 from typing import Any
 
 import numpy as np
 
 from shoal.error_budget import ErrorBudget, Grade
+from shoal.findings import Finding, message, steps
+from shoal.mechanics.analysis.findings import EquilibriumStatus, status_of
 from shoal.mechanics.analysis.joint_reactions import Reactions
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
@@ -17,22 +18,12 @@ from shoal.scene import Rod, Scene
 from shoal.trajectory import plain
 
 
-class EquilibriumStatus(StrEnum):
-    """Status of a search for an equilibrium. Only `ok` is accepted."""
-
-    OK = "ok"
-    UNSTABLE = "unstable"
-    UNHELD = "nothing-holds"
-    UNTOLD = "cannot-be-told"
-    FAILED = "failed"
-
-
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
     """A state of rest, and the evidence for it.
 
-    scene: as it was given. balanced: whether the forces balance, stably or not. q: coordinates; multipliers: lambda,
-    Q = C_q' lambda.
+    scene: as it was given. findings: about the search and the state. balanced: whether the forces balance, stably or
+    not. q: coordinates; multipliers: lambda, Q = C_q' lambda.
     markers: names; points [m], (markers, d); angles [rad], counted over full turns from the start, in
     space of the direction's shadow in the plane z = 0, (markers,).
     energy: strain, gravity, applied [J]; strain_energy: of every flexible body [J]. residual: unbalanced force
@@ -48,8 +39,7 @@ class Equilibrium:
 
     scene: Scene
     time: float
-    status: EquilibriumStatus
-    message: str
+    findings: list[Finding]
     balanced: bool
     q: Array
     multipliers: Array
@@ -71,6 +61,26 @@ class Equilibrium:
     theory_error: float | None = None
     not_estimated: tuple[str, ...] = ()
     estimated: bool = False
+
+    @property
+    def status(self) -> EquilibriumStatus:
+        """The worst status that the findings imply."""
+        return status_of(self.findings)
+
+    @property
+    def codes(self) -> list[str]:
+        """The codes of the findings, in their order."""
+        return [one.code for one in self.findings]
+
+    @property
+    def message(self) -> str:
+        """The findings in one line."""
+        return message(self.findings)
+
+    @property
+    def advice(self) -> list[str]:
+        """Steps to take next."""
+        return steps(self.findings)
 
     @property
     def errors(self) -> ErrorBudget:
@@ -110,6 +120,8 @@ class Equilibrium:
         return {
             "status": str(self.status),
             "message": self.message,
+            "advice": self.advice,
+            "findings": [one.to_json() for one in self.findings],
             "time": self.time,
             "stable": self.stable,
             "markers": {

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from shoal.arguments import check
-from shoal.mechanics.analysis.equilibrium import Equilibrium, EquilibriumStatus
+from shoal.mechanics.analysis import findings as kinds
+from shoal.mechanics.analysis.equilibrium import Equilibrium
 from shoal.mechanics.analysis.mesh_error import apart, beyond, finer
 from shoal.mechanics.analysis.statics import statics
 from shoal.scene import Scene
@@ -40,7 +41,8 @@ def settled(scene: Scene, tolerance: float, time: float = 0.0) -> Equilibrium:
         return found
     other = _refined(stout, tolerance, time, other)
     if other.ok and np.isfinite(away):
-        return replace(other, message=f"with shear, which is worth {away:.1e} m")
+        shear = kinds.SHEAR.found(f"with shear, which is worth {away:.1e} m", distance=float(away))
+        return replace(other, findings=[*other.findings, shear])
     return other if other.ok or found.ok else found
 
 
@@ -67,6 +69,5 @@ def _refined(scene: Scene, tolerance: float, time: float, begun: Equilibrium | N
         return found
     return replace(
         found,
-        status=EquilibriumStatus.FAILED,
-        message=f"no mesh that was tried is within the tolerance {tolerance:g} m",
+        findings=[kinds.NO_MESH.found(f"no mesh that was tried is within the tolerance {tolerance:g} m")],
     )

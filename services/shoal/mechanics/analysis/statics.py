@@ -15,13 +15,16 @@ import numpy as np
 import scipy.linalg
 
 from shoal.arguments import check
+from shoal.findings import Finding
 from shoal.mechanics import plane
 from shoal.mechanics.affine import points
+from shoal.mechanics.analysis import findings as kinds
 from shoal.mechanics.analysis import left_out
 from shoal.mechanics.analysis.balance import BALANCED, FALLS, Balance, View
 from shoal.mechanics.analysis.damped import small
-from shoal.mechanics.analysis.equilibrium import Equilibrium, EquilibriumStatus
+from shoal.mechanics.analysis.equilibrium import Equilibrium
 from shoal.mechanics.analysis.evaluate import Evaluator
+from shoal.mechanics.analysis.findings import EquilibriumStatus, status_of
 from shoal.mechanics.analysis.going_on import as_stated
 from shoal.mechanics.analysis.idle_spins import idle_spins
 from shoal.mechanics.analysis.joint_reactions import reactions_of
@@ -100,10 +103,11 @@ class _Search:
         q = self._assembled()
         q, gap = self.balance.restore(q)
         if gap > GAPE * self.balance.size:
-            return self._ending(q, EquilibriumStatus.FAILED, f"the joints cannot be closed: they gape by {gap:.2g}")
+            text = f"the joints cannot be closed: they gape by {gap:.2g}"
+            return self._ending(q, [kinds.JOINTS_OPEN.found(text, gap=gap)])
         self._leave_out_spins(q)
         has_potential = not self.evaluator.follows
-        message = ""
+        met = list[Finding]()
         found = self._at(q) or self._loaded(q)
         if (found is None or not found.converged) and not leave_unstable:
             start = q if found is None else found.point
@@ -112,7 +116,7 @@ class _Search:
                 found = straight
         if found is None or not found.converged:
             if found is not None:
-                message = "snapped or buckled on the way; "
+                met = [kinds.SNAPPED.found("snapped or buckled on the way")]
                 q = self._nudged(found.point) if has_potential else found.point
             found = self._descended(q)
         for attempt in range(4):
@@ -121,14 +125,16 @@ class _Search:
             eigenvalues, levels, _ = self._eigen(found.point)
             if not (leave_unstable and has_potential) or not np.any(np.real(eigenvalues) < -levels):
                 break
-            message = "left an unstable equilibrium; "
+            met = [kinds.LEFT_UNSTABLE.found("left an unstable equilibrium")]
             found = self._descended(found.point + KICK * (1 + attempt) * self._soft(found.point)[0])
         if found.converged:
             refined = self._count(self.balance.newton(found.point, most=6))
             if refined.converged and self._turn(found.point, refined.point) < 1e-3:
                 found = refined
                 self._follow(found.point)
-        return self._judge(found, message)
+        if not found.converged and (endless := self._endless(found)):
+            return self._ending(found.point, endless)
+        return self._ending(found.point, self._assess(found, met), found)
 
     def _nudged(self, q: Array) -> Array:
         """Return a position to descend from, perturbed to one side where both are equal, as in buckling."""
@@ -160,68 +166,74 @@ class _Search:
         along = self.placement.start_of(self.placement.direction(scene, at))[0][:, 0]
         return float(plane.angle(along))
 
-    def _judge(self, found: Root[Array], message: str) -> Equilibrium:
+    def _assess(self, found: Root[Array], met: list[Finding]) -> list[Finding]:
+        """Return the findings about the end of a search. met: on the way."""
         eigenvalues, levels, lowest = self._eigen(found.point)
         view = self.balance.look(found.point)
         residual = self.balance.residual(view)
         if not found.converged:
-            if found.message == FALLS:
-                moved = found.point - self.evaluator.model.q0[:, 0]
-                text = f"nothing holds {self._movers(moved)}; it falls without end"
-                return self._ending(found.point, EquilibriumStatus.UNHELD, text)
-            driving, turns = self._driving(), np.abs(self.wound) / (2 * np.pi)
-            if np.max(turns, initial=0.0) > TURNS:
-                name, most = self.owners[int(np.argmax(turns))], np.max(turns)
-                text = f"nothing holds {name} against {driving}; after {most:.0f} turns it goes on turning"
-                return self._ending(found.point, EquilibriumStatus.UNHELD, text)
-            message += found.message
-            if self.evaluator.follows:
-                message += f" under what follows its motion ({driving}); a start nearer to rest may help"
-            return self._ending(found.point, EquilibriumStatus.FAILED, message, found)
+            return [*met, self._unfinished(found)]
         if residual > BALANCED:
-            text = f"{message}the forces do not balance, {residual:.1g} of them is left"
-            return self._ending(found.point, EquilibriumStatus.FAILED, text, found)
+            text = f"the forces do not balance, {residual:.1g} of them is left"
+            return [*met, kinds.UNBALANCED.found(text, residual=residual)]
         growth = self._growth(found.point, view) if self.evaluator.follows else None
         if growth is not None and growth > 0:
             text = f"forces that follow the motion make it grow with exp(t * {growth:.4g}/s)"
-            return self._ending(found.point, EquilibriumStatus.UNSTABLE, text, found)
+            return [kinds.GROWS.found(text, rate=growth)]
         complex_pair = np.any(np.abs(np.imag(eigenvalues)) > 1e-9 * np.abs(eigenvalues) + levels)
         if growth is None and complex_pair:
-            return self._ending(
-                found.point, EquilibriumStatus.UNSTABLE, "forces that follow the motion make it flutter", found
-            )
+            return [kinds.GROWS.found("forces that follow the motion make it flutter")]
         if len(eigenvalues) and np.real(eigenvalues[0]) < -levels[0]:
-            text = f"unstable: it leaves with exp(t * {np.sqrt(-np.real(eigenvalues[0])):.4g}/s); moves first: "
-            return self._ending(found.point, EquilibriumStatus.UNSTABLE, message + text + self._movers(lowest), found)
+            rate = float(np.sqrt(-np.real(eigenvalues[0])))
+            text = f"unstable: it leaves with exp(t * {rate:.4g}/s); moves first: {self._movers(lowest)}"
+            return [*met, kinds.UNSTABLE.found(text, rate=rate)]
         loose = np.real(eigenvalues) <= levels
         if np.any(loose) and hides(levels[loose], eigenvalues, pull(self.scene)):
             least = float(np.sqrt(np.max(levels[loose])))
-            text = f"{message}round-off hides whether {self._movers(lowest)} is held, by less than {least:.1g} rad/s"
-            return self._ending(found.point, EquilibriumStatus.UNTOLD, text, found)
+            text = f"round-off hides whether {self._movers(lowest)} is held, by less than {least:.1g} rad/s"
+            return [*met, kinds.INDETERMINATE.found(text, frequency=least)]
         if np.any(loose):
-            text = f"{message}nothing holds {self._movers(lowest)}; it may rest in other places as well"
-            return self._ending(found.point, EquilibriumStatus.UNHELD, text, found)
+            text = f"nothing holds {self._movers(lowest)}; it may rest in other places as well"
+            return [*met, kinds.LOOSE.found(text)]
         if self.spinning:
             axes = "its axis" if len(self.spinning) == 1 else "their axes"
-            message += f"{', '.join(self.spinning)}: free to spin about {axes}, which moves nothing"
-        return self._ending(found.point, EquilibriumStatus.OK, message.rstrip("; "), found)
+            text = f"{', '.join(self.spinning)}: free to spin about {axes}, which moves nothing"
+            return [*met, kinds.FREE_SPIN.found(text)]
+        return met
 
-    def _ending(
-        self, q: Array, status: EquilibriumStatus, message: str, found: Root[Array] | None = None
-    ) -> Equilibrium:
+    def _endless(self, found: Root[Array]) -> list[Finding]:
+        """Return a finding where the machine falls or turns without end."""
+        if found.message == FALLS:
+            moved = found.point - self.evaluator.model.q0[:, 0]
+            return [kinds.FALLS.found(f"nothing holds {self._movers(moved)}; it falls without end")]
+        turns = np.abs(self.wound) / (2 * np.pi)
+        if np.max(turns, initial=0.0) <= TURNS:
+            return []
+        name, most = self.owners[int(np.argmax(turns))], float(np.max(turns))
+        text = f"nothing holds {name} against {self._driving()}; after {most:.0f} turns it goes on turning"
+        return [kinds.WINDS_UP.found(text, turns=most)]
+
+    def _unfinished(self, found: Root[Array]) -> Finding:
+        """Return the finding that a search did not come to rest."""
+        text = found.message
+        if self.evaluator.follows:
+            text += f" under what follows its motion ({self._driving()}); a start nearer to rest may help"
+        return kinds.NOT_AT_REST.found(text)
+
+    def _ending(self, q: Array, findings: list[Finding], found: Root[Array] | None = None) -> Equilibrium:
         view = self.balance.look(q)
         e = view.evaluation
         at = self.marker_points.at(q)
-        balanced = status is not EquilibriumStatus.FAILED and found is not None
+        failed = status_of(findings) is EquilibriumStatus.FAILED
+        balanced = not failed and found is not None
         rest = np.zeros_like(q)
         eigenvalues, levels, _ = self._eigen(q)
         react = cache(lambda: reactions_of(self.evaluator, q, rest, rest, self.time)) if balanced else None
-        notes = message, left_out.friction(self.scene, react), left_out.driven(self.evaluator, q, self.time)
+        neglected = left_out.friction(self.scene, react), left_out.driven(self.evaluator, q, self.time)
         return Equilibrium(
             scene=self.stated,
             time=self.time,
-            status=status,
-            message="; ".join(note for note in notes if note),
+            findings=[*findings, *(kinds.NEGLECTED.found(text) for text in neglected if text)],
             balanced=balanced,
             q=q,
             multipliers=view.multipliers,

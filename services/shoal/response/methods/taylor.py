@@ -64,10 +64,10 @@ def taylor(study: Study) -> Plan:
     """
     parameters, order = len(study.inputs), min(study.degree or 1, 2)
     unit = STEP * np.eye(parameters)
-    places = [np.zeros((1, parameters)), unit, -unit]
+    around = [np.zeros((1, parameters)), unit, -unit]
     if order == 2 and parameters > 1:
-        places.append(np.array([unit[i] + unit[j] for i, j in combinations(range(parameters), 2)]))
-    stencil = np.concatenate(places)
+        around.append(np.array([unit[i] + unit[j] for i, j in combinations(range(parameters), 2)]))
+    stencil = np.concatenate(around)
     most = min(study.count or len(stencil), study.runs.left)
     cut = max(1, int((most / len(stencil)) ** (1 / parameters) + 1e-9))
     middles = np.array(list(product((2 * np.arange(cut) + 1) / cut - 1, repeat=parameters)))

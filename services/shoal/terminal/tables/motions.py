@@ -147,6 +147,7 @@ def equilibrium_table(equilibrium: Equilibrium) -> None:
         + f"; {equilibrium.iterations} iterations",
         style=screen.COLOURS[equilibrium.grade],
     )
+    screen.say(*(f"next: {step}" for step in equilibrium.advice))
     if equilibrium.errors.estimates:
         screen.say(f"estimated error at the markers: {equilibrium.errors}")
 

@@ -1,0 +1,80 @@
+"""The status of a search for an equilibrium, and the kinds of findings that it follows from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from enum import StrEnum
+
+from shoal.findings import Finding, Kind, Severity, worst_implied
+
+
+class EquilibriumStatus(StrEnum):
+    """Status of a search for an equilibrium, the worst last. Only `ok` is accepted."""
+
+    OK = "ok"
+    UNSTABLE = "unstable"
+    UNHELD = "nothing-holds"
+    UNTOLD = "cannot-be-told"
+    FAILED = "failed"
+
+
+def status_of(findings: Iterable[Finding]) -> EquilibriumStatus:
+    """Return the worst status that findings imply; ok where none implies any."""
+    return worst_implied(findings, EquilibriumStatus)
+
+
+def _rejects(code: str, status: EquilibriumStatus, meaning: str, remedy: str = "") -> Kind:
+    return Kind(code, Severity.REJECTION, meaning, remedy, status)
+
+
+_HOLD = "add what holds it: a joint, a spring, or gravity"
+
+JOINTS_OPEN = _rejects(
+    "joints-open",
+    EquilibriumStatus.FAILED,
+    "The joints cannot be closed.",
+    "state a start near a position in which the machine can be assembled",
+)
+NOT_AT_REST = _rejects(
+    "not-at-rest",
+    EquilibriumStatus.FAILED,
+    "The search ended before the machine was at rest.",
+    "start nearer to the equilibrium",
+)
+NO_MESH = _rejects(
+    "no-mesh-within-tolerance",
+    EquilibriumStatus.FAILED,
+    "No mesh that was tried has an error within the tolerance.",
+    "state a larger tolerance",
+)
+UNBALANCED = _rejects(
+    "forces-unbalanced", EquilibriumStatus.FAILED, "The search converged, but the forces do not balance."
+)
+FALLS = _rejects("falls-without-end", EquilibriumStatus.UNHELD, "Nothing stops the machine from falling.", _HOLD)
+WINDS_UP = _rejects("turns-without-end", EquilibriumStatus.UNHELD, "Nothing stops a body from turning.", _HOLD)
+LOOSE = _rejects(
+    "nothing-holds",
+    EquilibriumStatus.UNHELD,
+    "The stiffness of some displacement vanishes: the machine may rest in other positions as well.",
+    _HOLD,
+)
+INDETERMINATE = _rejects(
+    "stability-indeterminate",
+    EquilibriumStatus.UNTOLD,
+    "The stiffness of some displacement is below the round-off of the others.",
+)
+GROWS = _rejects(
+    "follower-forces-drive",
+    EquilibriumStatus.UNSTABLE,
+    "Forces that follow the motion make a small motion grow, or flutter.",
+)
+UNSTABLE = _rejects(
+    "unstable", EquilibriumStatus.UNSTABLE, "The forces balance, and a small displacement grows.", "allow it to leave"
+)
+SNAPPED = Kind("snapped", Severity.NOTE, "The machine snapped through or buckled while the loads were applied.")
+LEFT_UNSTABLE = Kind("unstable-left", Severity.NOTE, "An unstable equilibrium was met first, and left.")
+FREE_SPIN = Kind("free-to-spin", Severity.NOTE, "A body may spin about its own axis, which moves nothing.")
+NEGLECTED = Kind(
+    "effect-neglected", Severity.CAUTION, "An effect of the scene is not part of statics: dry friction, driven motion."
+)
+SHEAR = Kind("with-shear", Severity.NOTE, "Rods with shear deformation took the place of slender ones.")
