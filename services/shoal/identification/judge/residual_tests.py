@@ -9,21 +9,16 @@ import numpy as np
 import numpy.typing as npt
 
 from shoal.identification.forward import ForwardModel
+from shoal.identification.methods.outcome import GROSS, NOISES
 from shoal.identification.recording.units import of_channels
 from shoal.identification.spread.chances import above_chi_square
-from shoal.identification.spread.covariance import Block, Noise
+from shoal.identification.spread.covariance import DOUBT, Block, Noise
 from shoal.trajectory import Array, plain
 
-_LARGE = 3.0
-"""Times a noise that is only estimated, from where on a residual is more than noise and its own uncertainty."""
 _LOUD = 1.5
 """Times the stated noise: a white residual up to here is a noise that was stated too small, a larger one is not."""
 _SURE = 1e-6
 """Chance below which an estimated noise counts as exceeded; models are looked at for many reasons, so it is small."""
-_DOUBT = 1e-3
-"""Chance below which a test against a stated noise, or of whiteness, counts as failed: a right model fails 1 in 500."""
-_NO_FIT = 0.05
-"""Of the signal: a systematic residual above this is a wrong model, one below it an imperfect one."""
 _HARDLY = 0.3
 """Of the signal: a residual above this that is not white is none of a right model, whatever the noise may be."""
 _TABLE_DIGITS = 1e-9
@@ -38,12 +33,13 @@ _LAGS = 16
 """Earlier samples that foretell one, at most a fifth of all: so many foretell eight lines of a spectrum."""
 _FAR = 3
 """Samples later they do: noise is alike so far apart by no differences, such as those that make a rate of angles."""
-_OUTLIER = 5.0
+OUTLIER = 5.0
+"""Robust standard deviations: of normal noise one sample in two million is farther off."""
 _FEW = 0.1
 """Of the samples: so many outliers a robust loss may set aside."""
 _DIGITS = 1e-12
 """Of the data: no deviation below is held against a model, as a motion is computed to this tolerance by default."""
-_MAD = 1.4826
+MAD = 1.4826
 """Standard deviation over the median absolute deviation of a normal distribution."""
 
 
@@ -104,19 +100,19 @@ class ResidualTests:
     @property
     def white(self) -> bool:
         """Return whether the residuals may be white noise."""
-        return self.chance_of_white > _DOUBT
+        return self.chance_of_white > DOUBT
 
     @property
     def too_large(self) -> bool:
         """Return whether the residual is larger than the stated noise, by a chance that leaves little doubt."""
-        return self.noise_stated and self.ratio > 1.0 and self.chance_of_size < _DOUBT
+        return self.noise_stated and self.ratio > 1.0 and self.chance_of_size < DOUBT
 
     @property
     def systematic(self) -> bool:
         """Return whether the residual is more than noise: larger than stated, and not white; or much larger."""
         if self.noise_stated:
             return self.too_large and (not self.white or self.ratio > _LOUD)
-        return self.ratio > _LARGE and self.chance_of_size < _SURE
+        return self.ratio > NOISES and self.chance_of_size < _SURE
 
     @property
     def limited(self) -> bool:
@@ -138,7 +134,7 @@ class ResidualTests:
         if self.noise_stated:
             return self.systematic or self.explains_nothing
         hardly = not self.white and (self.ratio > 1.0 or self.unresolved) and self.size > _HARDLY * self.signal
-        return hardly or self.explains_nothing or (self.systematic and self.size > _NO_FIT * self.signal)
+        return hardly or self.explains_nothing or (self.systematic and self.size > GROSS * self.signal)
 
     def sized(self, size: float) -> str:
         """A size with its unit."""
@@ -167,7 +163,7 @@ class ResidualTests:
             return "that of round-off"
         if not self.white:
             return "not white noise"
-        if self.chance_as_it_is > _DOUBT:
+        if self.chance_as_it_is > DOUBT:
             return "none, like white noise"
         return "that of the model's own error, without which it is like white noise"
 
@@ -225,7 +221,7 @@ def residual_tests(
         outliers=int(sum(np.sum(part) for part in outlying)),
         rows=len(rows),
         unit=of_channels(model.measurement),
-        excess=0.0 if white > _DOUBT else _excess([left[block.rows] for block, _ in measured], seen, known, motion),
+        excess=0.0 if white > DOUBT else _excess([left[block.rows] for block, _ in measured], seen, known, motion),
         refined=smaller,
         chance_as_it_is=as_it_is,
         unresolved=unresolved,
@@ -290,4 +286,4 @@ def _digits(number: float, digits: int) -> str:
 
 def _outlying(residual: Array) -> npt.NDArray[np.bool_]:
     deviation = np.abs(residual - np.median(residual))
-    return np.asarray(deviation > _OUTLIER * _MAD * max(float(np.median(deviation)), 1e-300))
+    return np.asarray(deviation > OUTLIER * MAD * max(float(np.median(deviation)), 1e-300))

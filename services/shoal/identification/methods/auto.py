@@ -14,15 +14,12 @@ from shoal.identification.methods.growth import FRACTAL, LARGE, growth, swings
 from shoal.identification.methods.lanes import Descent, descend_many, differentiate_many, differing, distinct
 from shoal.identification.methods.least_squares import PATIENCE, differentiate, from_starts
 from shoal.identification.methods.multiple_shooting import multiple_shooting
-from shoal.identification.methods.outcome import Outcome
+from shoal.identification.methods.outcome import GROSS, NOISES, Outcome
 from shoal.identification.methods.progressive import extend
 from shoal.identification.methods.starts import scatter, starting_points
 from shoal.identification.recording.units import of_channels
 from shoal.trajectory import Array
 
-_UNEXPLAINED = 0.05
-"""Of the spread of the data: a fit that leaves more, and more than noise, is none."""
-_NOISES = 3.0
 _SWINGS = 3
 """A record that swings more often may be fitted with another phase: false minima."""
 _FACTOR, _ELSEWHERE, _DESCENTS, _DIPS = 5.0, 31, 6, 3
@@ -155,9 +152,9 @@ def explained(model: ForwardModel, outcome: Outcome) -> bool:
     rows = len(model.rows.time)
     left = np.sqrt(outcome.fitness * model.rows.samples / rows)
     if model.rows.noise is not None:
-        return bool(left <= _NOISES * model.rows.noise)
+        return bool(left <= NOISES * model.rows.noise)
     noise = float(np.max(np.nan_to_num(model.rows.estimated * model.rows.weight)))
-    return bool(left <= max(_UNEXPLAINED * model.rows.signal, _NOISES * noise))
+    return bool(left <= max(GROSS * model.rows.signal, NOISES * noise))
 
 
 def false_minima(model: ForwardModel, point: Array) -> list[Descent]:

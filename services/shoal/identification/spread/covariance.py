@@ -18,8 +18,8 @@ from shoal.trajectory import Array
 
 _ROUNDS = 60
 _SETTLED = 1e-5
-_DOUBT = 1e-3
-"""Chance below which residuals are larger than the stated noise, and that is not the noise."""
+DOUBT = 1e-3
+"""P-value below which a test against a stated noise, or of whiteness, fails: one right model in 500 does."""
 _LONGEST = 1.0 / 3.0
 """Correlation that outlasts this part of a recording cannot be told from a change of the parameters."""
 
@@ -140,7 +140,7 @@ def _noise(block: Block, variance: float, rho: float, part: Array) -> Noise:
         return Noise(variance, 0.0, np.inf)
     count = max(1.0, len(block.rows) - float(np.sum(part**2)))
     independent = max(1.0, count * (1.0 - rho**2) / (1.0 + rho**2))
-    if block.stated > 0.0 and above_chi_square(independent, independent * variance / block.stated**2) > _DOUBT:
+    if block.stated > 0.0 and above_chi_square(independent, independent * variance / block.stated**2) > DOUBT:
         rho *= max(0.0, 1.0 - 1.0 / (count * max(rho, 1e-9) ** 2))
         freedom = count * (1.0 - rho) / (2.0 * (1.0 + rho)) if rho > 0.0 else np.inf
         return Noise(block.stated**2, float(rho), max(1.0, freedom))

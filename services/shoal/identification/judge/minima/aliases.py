@@ -15,9 +15,10 @@ import numpy as np
 
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.minima.other_starts import turned
-from shoal.identification.judge.minima.rivals import apart, beside_samples, turn_of_samples
+from shoal.identification.judge.minima.rivals import FOLLOWED_WITHIN, apart, beside_samples, turn_of_samples
 from shoal.identification.methods.auto import explained
 from shoal.identification.methods.lanes import Descent, descend_many, differentiate_many, distinct
+from shoal.identification.methods.least_squares import PATIENCE
 from shoal.identification.methods.outcome import Outcome
 from shoal.identification.methods.progressive import extend
 from shoal.trajectory import Array
@@ -35,11 +36,8 @@ _COARSE, _MOST = 33, 2048
 """Points of a scan in the beginning, and at most."""
 _FOLLOWED = 8
 """Dips that are followed, of each parameter."""
-_FITS = 0.3
-"""Of the spread of the data: deviation (RMS) on the scanned samples, beyond that of the answer, that is followed."""
 _TURNED = 16
 """Starts by more turns from which an answer that leaves a misfit is sought anew."""
-_PATIENCE = 100.0
 
 
 def aliases(model: ForwardModel, outcome: Outcome) -> list[Descent]:
@@ -54,7 +52,7 @@ def aliases(model: ForwardModel, outcome: Outcome) -> list[Descent]:
     found = np.concatenate(dips) if dips else np.empty((0, len(outcome.point)))
     part, end = first, first.measurement.end
     while len(found):
-        ends = distinct(part, descend_many(part, np.vstack([outcome.point, found]), patience=_PATIENCE))
+        ends = distinct(part, descend_many(part, np.vstack([outcome.point, found]), patience=PATIENCE))
         limit = _limit(part, outcome.point)
         good = [d for d in ends if d.fitness <= limit and apart(model, d.point, outcome.point)]
         found = np.array([d.point for d in good])
@@ -89,7 +87,7 @@ def _first_part(model: ForwardModel) -> ForwardModel:
 def _limit(model: ForwardModel, point: Array) -> float:
     """Up to which fitness a point explains a part of the record about as well as the answer."""
     mine = float(model.cost(model.uncounted(point[None]))[0])
-    return mine + (_FITS * model.rows.signal) ** 2 * len(model.rows.time) / model.rows.samples
+    return mine + (FOLLOWED_WITHIN * model.rows.signal) ** 2 * len(model.rows.time) / model.rows.samples
 
 
 def _line(model: ForwardModel, point: Array, k: int, values: Array) -> Array:

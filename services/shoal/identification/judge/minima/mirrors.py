@@ -17,7 +17,7 @@ import numpy as np
 
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.minima.other_starts import mirrored, turned, within_bounds
-from shoal.identification.judge.minima.rivals import apart
+from shoal.identification.judge.minima.rivals import FOLLOWED_WITHIN, apart
 from shoal.identification.methods.lanes import Descent, descend_many, kept_apart
 from shoal.identification.methods.outcome import Outcome
 from shoal.identification.methods.starts import poses_at
@@ -28,8 +28,6 @@ _MOST = 256
 _SIMULATED, _FOLLOWED = 16, 4
 _ALIKE = 0.05
 """Of the spread of the data: deviation of an image's first channels from those of the answer."""
-_FITS = 0.3
-"""Of the spread of the data: deviation (RMS) of an image that is followed, beyond that of the answer."""
 
 
 def mirror_images(model: ForwardModel, outcome: Outcome) -> list[Descent]:
@@ -41,7 +39,7 @@ def mirror_images(model: ForwardModel, outcome: Outcome) -> list[Descent]:
         return []
     values = model.cost(model.uncounted(points))
     left = np.sqrt(np.maximum(values - outcome.fitness, 0.0) * model.rows.samples / len(model.rows.time))
-    good = [k for k in np.argsort(values, kind="stable") if left[k] < _FITS * model.rows.signal][:_FOLLOWED]
+    good = [k for k in np.argsort(values, kind="stable") if left[k] < FOLLOWED_WITHIN * model.rows.signal][:_FOLLOWED]
     if not good:
         return []
     *descents, own = descend_many(model, np.vstack([points[good], outcome.point]))

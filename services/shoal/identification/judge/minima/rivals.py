@@ -21,6 +21,8 @@ from shoal.trajectory import Array
 
 ALIAS = "the same at every sample, and apart between samples"
 """What an answer's alias is to it."""
+FOLLOWED_WITHIN = 0.3
+"""Of the spread of the data: what starts leave (RMS) beyond the answer, from which a descent is worth its runs."""
 _EVEN = 1e-3
 """Steps between samples that differ by no more of themselves are even."""
 _PART = 0.382

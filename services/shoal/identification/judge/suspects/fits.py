@@ -11,12 +11,11 @@ import numpy as np
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.suspects.candidate import FaultHypothesis, with_parameters
 from shoal.identification.methods.lanes import Descent, descend_each, difference_at
+from shoal.identification.methods.least_squares import PATIENCE
 from shoal.mechanics.numerics.tile import WIDE
 from shoal.trajectory import Array
 
 _ITERATIONS = 15
-_PATIENCE = 100.0
-"""Of the best one's fitness: a fit that promises no more is given up."""
 
 
 def groups_of(candidates: Iterable[FaultHypothesis]) -> list[list[FaultHypothesis]]:
@@ -76,4 +75,4 @@ class Together:
                 jacobians.append(np.where(np.isfinite(slope), slope, 0.0))
             return list(seen[:, 0]), jacobians
 
-        return descend_each(models, starts, differentiate, patience=_PATIENCE, most=_ITERATIONS)
+        return descend_each(models, starts, differentiate, patience=PATIENCE, most=_ITERATIONS)

@@ -9,15 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from shoal.identification.forward import ForwardModel
+from shoal.identification.judge.residual_tests import MAD, OUTLIER
 from shoal.identification.methods.lanes import descend_many
 from shoal.identification.methods.starts import starting_points
 from shoal.identification.recording.measurement import Recording
 from shoal.trajectory import Array
 
-_OFF = 5.0
-"""Standard deviations from a robust fit: what is farther off belongs to a stretch."""
-_MAD = 1.4826
-"""Standard deviation over the median absolute deviation of a normal distribution."""
 _FEWEST, _GAP = 4, 3
 """Samples of a stretch, and from one of them to the next, at most."""
 _MOST = 0.5
@@ -125,8 +122,8 @@ class _Stretch:
 def _stretches(model: ForwardModel, residual: Array) -> Iterator[_Stretch]:
     """Of each place, samples in a row that are off, and hardly any between them."""
     rows = model.rows
-    usual = np.maximum(rows.estimated * rows.weight, _MAD * float(np.median(np.abs(residual))))
-    off = np.abs(residual) > _OFF * usual
+    usual = np.maximum(rows.estimated * rows.weight, MAD * float(np.median(np.abs(residual))))
+    off = np.abs(residual) > OUTLIER * usual
     for number, (name, run) in enumerate(model.measurement.recordings.items()):
         for place in dict.fromkeys(channel.place for channel in run.channels):
             channels = [k for k, channel in enumerate(run.channels) if channel.place == place]

@@ -30,6 +30,7 @@ from shoal.identification.judge.suspects.of_samples import LeftOut, recordings, 
 from shoal.identification.judge.suspects.shaken import shaken
 from shoal.identification.judge.suspects.suspect import Suspect, penalty
 from shoal.identification.methods.lanes import Descent, descend_many
+from shoal.identification.methods.outcome import GROSS
 from shoal.identification.methods.starts import starting_points
 from shoal.identification.recording.units import of_channels
 from shoal.identification.spread.covariance import blocks_of
@@ -48,8 +49,6 @@ _READ = 6
 _AFTER_SCAN = 3
 _HOPELESS = 0.98
 """Of the present misfit: a promise of no less is not followed."""
-_GROSS = 0.05
-"""Of the signal: from this misfit on the numbers may have been read wrongly."""
 _SHARES = np.array([1.0, 0.5, 0.2, 0.05, 0.0])
 """Of the change that the regression promises, from the best of which a fit starts."""
 _SCAN = 11
@@ -175,7 +174,7 @@ class _FaultSearch:
         if self._explained:
             return
         self._try([s for s in scored if s.promise < _HOPELESS or (s.candidate.name, s.candidate.kind) in significant])
-        gross = _GROSS * self.model.rows.signal
+        gross = GROSS * self.model.rows.signal
         if self.before > gross > 0.0:
             self._read()
         if self.model.scene.dimensions == 2 and not self._explained:
@@ -204,7 +203,7 @@ class _FaultSearch:
     def _try(self, scored: list[_Scored]) -> None:
         """Fit the most promising, then the next ones, until one explains the misfit wholly."""
         # A small fault does what its derivative says, a large one may do better.
-        scored = scored if self.before > _GROSS * self.model.rows.signal else self._near(scored)
+        scored = scored if self.before > GROSS * self.model.rows.signal else self._near(scored)
         for k in range(0, len(scored), _FITTED):
             self._fit(scored[k : k + _FITTED])
             if self._explained:
