@@ -11,8 +11,8 @@ from shoal.engines import get_engine
 from shoal.identification import Estimate, Measurement, Problem, Verdict
 from shoal.identification.conclude import NOTHING, conclude
 from shoal.identification.deadline import TimeIsUp
+from shoal.identification.diagnostics.suspects import search
 from shoal.identification.forward import ForwardModel
-from shoal.identification.judge.suspects import search
 from shoal.identification.methods import get_method
 from shoal.identification.recording.noise import differences
 from shoal.scene import Scene

@@ -11,13 +11,13 @@ from shoal.identification import findings as kinds
 from shoal.identification.adapt import AdaptedModel
 from shoal.identification.carried import fitted, joint
 from shoal.identification.deadline import unless_late
+from shoal.identification.diagnostics.judgement import Judgement
+from shoal.identification.diagnostics.other_laws import wider_by_other_laws
+from shoal.identification.diagnostics.remarks import beyond_noise, remarks
 from shoal.identification.estimate import Estimate
 from shoal.identification.evidence import Evidence
 from shoal.identification.findings import Verdict
 from shoal.identification.forward import ForwardModel
-from shoal.identification.judge.judgement import Judgement
-from shoal.identification.judge.other_laws import wider_by_other_laws
-from shoal.identification.judge.remarks import beyond_noise, remarks
 from shoal.identification.methods.outcome import Outcome
 from shoal.identification.spread import intervals
 from shoal.identification.spread.bootstrap import bootstrap

@@ -13,12 +13,12 @@ from shoal.identification import findings as kinds
 from shoal.identification.adapt import AdaptedModel
 from shoal.identification.assemble import assemble
 from shoal.identification.deadline import unless_late
+from shoal.identification.diagnostics.judgement import Judgement, judge
+from shoal.identification.diagnostics.minima.turns import with_nearest_turns
 from shoal.identification.estimate import Estimate
 from shoal.identification.evidence import Evidence, evidence
 from shoal.identification.findings import Verdict
 from shoal.identification.forward import ForwardModel
-from shoal.identification.judge.judgement import Judgement, judge
-from shoal.identification.judge.minima.turns import with_nearest_turns
 from shoal.identification.lengthening import lengthened
 from shoal.identification.methods.growth import FRACTAL, LARGE, growth
 from shoal.identification.methods.lanes import Descent, descend_many, descend_on

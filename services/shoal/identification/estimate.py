@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 from shoal.errors import InputError
 from shoal.findings import Finding, message, steps
 from shoal.identification.dataset import dataset
+from shoal.identification.diagnostics.hypotheses import Hypothesis
+from shoal.identification.diagnostics.residual_tests import ResidualTests
+from shoal.identification.diagnostics.suspects import Suspect
 from shoal.identification.findings import Verdict, verdict_of
-from shoal.identification.judge.hypotheses import Hypothesis
-from shoal.identification.judge.residual_tests import ResidualTests
-from shoal.identification.judge.suspects import Suspect
 from shoal.identification.recording.measurement import Measurement
 from shoal.identification.spread.bootstrap import Bootstrap
 from shoal.identification.spread.posterior import Posterior

@@ -8,9 +8,9 @@ from functools import reduce
 import numpy as np
 
 from shoal.identification.deadline import unless_late
+from shoal.identification.diagnostics.hypotheses import ScoreTest
+from shoal.identification.diagnostics.residual_tests import ResidualTests, residual_tests
 from shoal.identification.forward import ForwardModel
-from shoal.identification.judge.hypotheses import ScoreTest
-from shoal.identification.judge.residual_tests import ResidualTests, residual_tests
 from shoal.identification.spread.covariance import Block, blocks_of
 from shoal.identification.spread.given import Given
 from shoal.identification.spread.model_error import Corrections, ModelError, model_error, rms_of

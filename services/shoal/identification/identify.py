@@ -20,9 +20,9 @@ from shoal.identification.adapt import AdaptedModel, Stopped, coarse_to_fine
 from shoal.identification.carried import Carried
 from shoal.identification.conclude import NOTHING, Wishes, conclude
 from shoal.identification.deadline import Deadline, TimeIsUp, unless_late
+from shoal.identification.diagnostics.minima.search import with_other_minima
 from shoal.identification.estimate import Estimate
 from shoal.identification.forward import ForwardModel
-from shoal.identification.judge.minima.search import with_other_minima
 from shoal.identification.measure import Windows, measure
 from shoal.identification.methods import Method, Outcome, get_method
 from shoal.identification.methods.starts import starting_points

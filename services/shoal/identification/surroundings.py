@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shoal.identification.deadline import unless_late
+from shoal.identification.diagnostics.judgement import Judgement
+from shoal.identification.diagnostics.minima.rivals import valley
+from shoal.identification.diagnostics.other_laws import OtherLaw, other_laws
 from shoal.identification.evidence import Evidence
 from shoal.identification.forward import ForwardModel
-from shoal.identification.judge.judgement import Judgement
-from shoal.identification.judge.minima.rivals import valley
-from shoal.identification.judge.other_laws import OtherLaw, other_laws
 from shoal.identification.methods.growth import FRACTAL, growth
 from shoal.identification.methods.outcome import Outcome
 from shoal.identification.spread import intervals

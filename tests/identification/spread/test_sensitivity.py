@@ -12,9 +12,9 @@ from shoal.engines.casadi.shooting import shot
 from shoal.findings import message
 from shoal.identification import Measurement, Problem, Verdict, identify
 from shoal.identification.conclude import NOTHING, conclude
+from shoal.identification.diagnostics.judgement import judge
 from shoal.identification.evidence import evidence
 from shoal.identification.forward import ForwardModel
-from shoal.identification.judge.judgement import judge
 from shoal.identification.lengthening import lengthened
 from shoal.identification.methods.auto import auto
 from shoal.identification.methods.least_squares import differentiate as naive

@@ -16,11 +16,11 @@ from dataclasses import replace
 import numpy as np
 from shoal.engines import get_engine
 from shoal.identification import Measurement, Problem
+from shoal.identification.diagnostics.residual_tests import residual_tests
+from shoal.identification.diagnostics.suspects.candidate import with_parameters
+from shoal.identification.diagnostics.suspects.of_machine import of_machine
+from shoal.identification.diagnostics.suspects.of_measurement import of_measurement
 from shoal.identification.forward import ForwardModel
-from shoal.identification.judge.residual_tests import residual_tests
-from shoal.identification.judge.suspects.candidate import with_parameters
-from shoal.identification.judge.suspects.of_machine import of_machine
-from shoal.identification.judge.suspects.of_measurement import of_measurement
 from shoal.identification.recording.observation import observe
 from shoal.identification.spread.covariance import blocks_of
 from shoal.identification.spread.sensitivity import sensitivity

@@ -11,8 +11,8 @@ from scipy.special import betaincinv
 from shoal.engines import get_engine
 from shoal.identification import Verdict
 from shoal.identification.conclude import NOTHING, conclude
+from shoal.identification.diagnostics.suspects import Suspect
 from shoal.identification.forward import ForwardModel
-from shoal.identification.judge.suspects import Suspect
 from shoal.identification.methods import get_method
 
 from shoal_validation.suspects.cases import case

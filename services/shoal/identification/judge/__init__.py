@@ -1,1 +1,0 @@
-"""What the evidence allows to say about an answer: residual tests, rivals, suspects, and the verdict."""

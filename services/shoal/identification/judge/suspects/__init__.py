@@ -1,6 +1,0 @@
-"""Where a model does not fit: which of the things taken as known would explain it."""
-
-from shoal.identification.judge.suspects.search import FaultSearch, suspects
-from shoal.identification.judge.suspects.suspect import Suspect
-
-__all__ = ["FaultSearch", "Suspect", "suspects"]
