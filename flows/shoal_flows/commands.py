@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 from pathlib import Path
@@ -99,11 +100,18 @@ def upload() -> None:
 @click.command()
 @click.option("--host", default="127.0.0.1", show_default=True)
 @click.option("--port", default=5000, show_default=True)
-def ui(host: str, port: int) -> None:
-    """Serve the MLflow dashboard of all runs until Ctrl-C."""
+@click.option(
+    "--browser/--no-browser", default=None, help="Open the morning page. Default: in a terminal with a screen."
+)
+def ui(host: str, port: int, browser: bool | None) -> None:
+    """Serve the MLflow dashboard of all runs until Ctrl-C, and write the morning page.
+
+    The page says what ran in the last day, what is not to be trusted, and which parameters drift.
+    """
     from shoal_flows.ui import ui
 
-    ui(host, port)
+    screen = sys.platform != "linux" or bool({"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys())
+    ui(host, port, browser=sys.stdout.isatty() and screen if browser is None else browser)
 
 
 @click.command()

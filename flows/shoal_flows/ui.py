@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+import webbrowser
 from collections.abc import Mapping
 from contextlib import suppress
 from urllib.error import URLError
@@ -18,14 +19,15 @@ from shoal.errors import ComputationError, InputError
 from shoal.ports import check_free
 
 from shoal_flows import settings
+from shoal_flows.report import morning
 from shoal_flows.tracking.addresses import latest_study
 
 _PATIENCE = 600.0
 """In s, as of `make up`: on a busy machine MLflow's server takes minutes; one that dies is noticed at once."""
 
 
-def ui(host: str, port: int) -> None:
-    """Serve MLflow. Raises InputError, ComputationError."""
+def ui(host: str, port: int, *, browser: bool) -> None:
+    """Serve MLflow, and write the morning page. browser: open the page in it. Raises InputError, ComputationError."""
     settings.apply()
     if address := settings.tracking_server():
         raise InputError(f"MLFLOW_TRACKING_URI: the runs are on {address}; browse them there")
@@ -37,6 +39,10 @@ def ui(host: str, port: int) -> None:
     try:
         _wait(process, host, port)
         console.print(f"MLflow:  http://{host}:{port}  (Ctrl-C stops it)", soft_wrap=True)
+        page = morning.refresh().as_uri()
+        console.print(f"this morning:      {page}", soft_wrap=True)
+        if browser:
+            webbrowser.open(page)
         if is_wildcard(host) and not os.environ.get(SETTING):
             text = f"{SETTING} is empty: other machines are refused; list the names by which they reach this one"
             console.print(text, soft_wrap=True)

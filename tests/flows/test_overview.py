@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from shoal.cli import main
 from shoal.errors import InputError
 from shoal_flows.report import overview
-from shoal_flows.report.overview import WEEK, Drift, Study, drift, independent
+from shoal_flows.report.drifts import WEEK, Drift, Study, drift, independent
 from shoal_flows.tracking.data import Data, inputs
 from shoal_flows.tracking.store import connect, experiment
 

@@ -35,13 +35,13 @@ def test_ui_refuses_a_port_in_use_in_one_line() -> None:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         with pytest.raises(InputError, match=r"^port: cannot listen on 127.0.0.1:\d+: .*--port$"):
-            ui("127.0.0.1", taken.getsockname()[1])
+            ui("127.0.0.1", taken.getsockname()[1], browser=False)
 
 
 def test_ui_names_the_server_that_has_the_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MLFLOW_TRACKING_URI", "http://tracking:5000")
     with pytest.raises(InputError, match="the runs are on http://tracking:5000"):
-        ui("127.0.0.1", 5000)
+        ui("127.0.0.1", 5000, browser=False)
 
 
 def test_pages_of_an_address_are_reached_under_it(monkeypatch: pytest.MonkeyPatch) -> None:

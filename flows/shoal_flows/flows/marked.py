@@ -1,14 +1,17 @@
-"""Flows that say that they run, so that those whose process is killed are found."""
+"""Hooks of every flow: its run is held, so that a killed one is found; its end brings the morning page up to date."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 from prefect import Flow
+from shoal.errors import ShoalError
 
 from shoal_flows import alive, server
 from shoal_flows.left import end_left
+from shoal_flows.report import morning
 
 _held: dict[str, Callable[[], None]] = {}
 
@@ -30,3 +33,5 @@ def _hold(flow: Any, flow_run: Any, state: Any) -> None:
 def _let_go(flow: Any, flow_run: Any, state: Any) -> None:
     if let_go := _held.pop(str(flow_run.id), None):
         let_go()
+    with suppress(ShoalError):  # A flow that has ended does not fail for a page.
+        morning.refresh()

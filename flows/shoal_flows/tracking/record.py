@@ -76,9 +76,10 @@ class Run:
             self.tags[_NOTE] = text[:_LONGEST]
 
     def judge(self, word: str, doubts: Sequence[str] = (), says: str = "Not to be trusted") -> None:
-        """Set the tag `verdict`; doubts: every reason not to trust the run, at the beginning of the description."""
+        """Set the tag `verdict`; doubts: every reason not to trust the run, a tag and the head of the description."""
         self.tags["verdict"] = word
         if doubts:
+            self.tags["doubts"] = "; ".join(doubts)[:_LONGEST]
             self.describe(f"**{says}:** {'; '.join(doubts)}\n\n{self.tags.get(_NOTE, '')}".strip())
 
     def params(self, values: Mapping[str, Any]) -> None:
