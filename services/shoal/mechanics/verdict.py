@@ -123,7 +123,7 @@ class Limits:
         if failed:
             return Status.FAILED, "no start agrees with the joints and with what is stated"
         if not finite and numbers[UNCLOSED] >= 0:
-            return Status.DRIFTED if self._driven else Status.DIVERGED, self._open(numbers)
+            return Status.DRIFTED if self._driven else Status.DIVERGED, self._open(numbers, adaptive)
         singular = numbers[SINGULAR] == HERE
         if not finite and np.isfinite(energy_drift) and adaptive and (singular or steps >= self._solver.max_steps):
             there = f"{steps:.0f} steps of {choice.name} led to {numbers[REACHED]:.4g} s only"
@@ -140,13 +140,15 @@ class Limits:
             advice = "" if adaptive else "; use a smaller step"
             return Status.ENERGY, f"energy is off by {energy_drift:.2g}, allowed {allowed:g} (relative){advice}"
         if not constraint_drift <= OPEN:
-            return Status.DRIFTED, self._open(numbers)
+            return Status.DRIFTED, self._open(numbers, adaptive)
         return Status.OK, ""
 
-    def _open(self, numbers: Array) -> str:
-        """Name the joint that no position closes, since when, and the likely cause."""
+    def _open(self, numbers: Array, adaptive: bool) -> str:
+        """Name the joint that no position closes, since when, and the likely causes."""
         field = self._field(self._model.constraint_names[int(numbers[UNCLOSED])])
         cause = REACH if self._driven else "use a smaller step"
+        if self._driven and not adaptive:
+            cause = f"use a smaller step, or {REACH}"
         return f"constraints are violated: {field} cannot be closed {self._since(numbers[ENDED])}; {cause}"
 
     def _since(self, t: float) -> str:
