@@ -288,7 +288,7 @@ def test_the_command_and_its_files(tmp_path: Path) -> None:
     kept = tmp_path / "runs"
     run = CliRunner().invoke(main, [*words, "--checkpoint", str(kept)])
     assert run.exit_code == 0, run.output
-    assert "is passed at the 2 instants looked at with a probability between" in run.stdout
+    assert "is exceeded at the 2 instants looked at with a probability between" in run.stdout
     assert "largest with initial.P.position.1 = 0.1" in run.stdout
     again = json.loads(CliRunner().invoke(main, [*words, "--json", "--checkpoint", str(kept)]).stdout)
     assert {**again, "wall_s": 0} == {**json.loads(json.dumps(found.to_json())), "wall_s": 0}

@@ -46,7 +46,7 @@ def test_the_page_of_intervals(intervals: Response, tmp_path: Path) -> None:
     assert set(moving["behind"]) == set(moving["outlines"]) == {"P"}
     assert moving["behind"] != moving["outlines"]
     assert "Widths, gaps and errors" in page
-    assert "passed" in page
+    assert "exceeded" in page
 
 
 def test_the_page_of_distributions(distributions: Response, tmp_path: Path) -> None:
@@ -54,7 +54,7 @@ def test_the_page_of_distributions(distributions: Response, tmp_path: Path) -> N
     page = (tmp_path / "page.html").read_text()
     assert "95 % interval" in page
     assert "Total Sobol indices" in page
-    assert "passed at an instant looked at" in page
+    assert "exceeded at an instant looked at" in page
 
 
 def test_a_limit_that_is_kept_is_kept_at_the_instants_looked_at(

@@ -92,6 +92,6 @@ def test_the_command_says_which_side_is_required() -> None:
     assert one["limit"] == other["limit"] == "A.y < -0.95"
     assert one["require"] == other["require"] == "A.y > -0.95"
     shown = " ".join(CliRunner().invoke(main, words).output.split())
-    assert "limit A.y < -0.95 (must not happen; required: A.y > -0.95): is passed" in shown
+    assert "limit A.y < -0.95 (must not happen; required: A.y > -0.95): is exceeded" in shown
     assert "requirement A.y > -0.95: is violated" in shown
     assert "requirement abs(A.angle) < 4: holds for all values" in shown

@@ -180,7 +180,7 @@ class Uncertain(OfScene):
     allocate: Annotated[bool, Option("Look for the widest tolerances that keep the limit.")] = False
     target: Annotated[
         Annotated[float, Limit("a probability", gt=0, lt=0.5)] | None,
-        Option("With allocate: the probability of passing the limit (default: 0.001)."),
+        Option("With allocate: the probability of exceeding the limit (default: 0.001)."),
     ] = None
     cost: Cost = None
     time_limit: Annotated[Seconds | None, Option("End after this time [s] with what is known.", "SECONDS")] = None

@@ -175,7 +175,7 @@ def of_random(
     widest: Array,
     **how: Any,
 ) -> Allocation:
-    """So that the limit is passed with a probability of at most `target`, whatever the values of the intervals.
+    """So that the limit is exceeded with a probability of at most `target`, whatever the values of the intervals.
 
     stated: what is known of the limit with the stated tolerances; widest: factors; how: of `between`. Raises
     InputError, ComputationError.

@@ -1,4 +1,4 @@
-"""The probability that a limit is passed where some parameters are random and others intervals: between which two.
+"""The probability that a limit is exceeded where some parameters are random and others intervals: between which two.
 
 The reliability index beta is a smooth function of the intervals. It is bounded as places of markers are: few runs of a
 reliability analysis at each of some interval values, a polynomial through their indices, whose extremal values are

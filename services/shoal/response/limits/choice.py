@@ -1,4 +1,4 @@
-"""The probability that a limit is passed: by which way, and why by that one."""
+"""The probability that a limit is exceeded: by which way, and why by that one."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from shoal.trajectory import Array
 OFTEN = 0.1
 """Probability from which plain sampling tells it as well."""
 PILOT = 200
-"""Runs of each level that look for the places where the limit is passed."""
+"""Runs of each level that look for the places where the limit is exceeded."""
 STARTS = 6
 """Searches for design points."""
 DIFFERENT = 0.8
@@ -114,7 +114,7 @@ def monte_carlo(margins: Margins, seed: int) -> Exceedance:
 def auto(margins: Margins, seed: int) -> Exceedance:
     """Importance sampling, whose proposals and control variate are found on a response surface of the runs before.
 
-    Where the limit is passed often, plain sampling is as good.
+    Where the limit is exceeded often, plain sampling is as good.
     """
     whole = margins.most
     # Subset simulation far from a limit takes all runs that it is given.
@@ -124,7 +124,7 @@ def auto(margins: Margins, seed: int) -> Exceedance:
     rough = pilot.estimate
     if rough.probability >= OFTEN:
         found = monte_carlo(margins, seed + 1)
-        return replace(found, why=f"{found.why}, as the limit is passed often")
+        return replace(found, why=f"{found.why}, as the limit is exceeded often")
     plain = np.random.default_rng(seed + 4).standard_normal((int(PLAIN * margins.left), len(margins.inputs)))
     rows = margins(plain)
     searched = _search(margins, pilot, [], seed + 10)

@@ -16,7 +16,7 @@ CONFIDENCE = 1.959963984540054
 
 @dataclass(frozen=True)
 class ExceedanceEstimate:
-    """The probability that a limit is passed at some instant up to each.
+    """The probability that a limit is exceeded at some instant up to each.
 
     passed: (instants,); deviation: of its logarithm, (instants,), infinite where no run has passed; unseen: a
     probability that the runs may have missed altogether; failed: probability of the runs that failed; between: share

@@ -29,7 +29,7 @@ class Limit:
     """Passed where a quantity lies beyond a bound: above it or below it, its absolute value or itself.
 
     text: as the user states it; place: a marker, a joint, or empty for the whole machine, as the quantity has it;
-    above: whether it is passed above the bound; stated: as what must not happen, or as what is required
+    above: whether it is exceeded above the bound; stated: as what must not happen, or as what is required
     """
 
     text: str
@@ -66,12 +66,12 @@ class Limit:
         """Describe a decision in words; kept: whether no interval values exceed the limit, None if undecided."""
         if self.is_required:
             return {True: "holds", False: "is violated", None: "is not decided"}[kept]
-        return {True: "is kept", False: "is passed", None: "is not decided"}[kept]
+        return {True: "is kept", False: "is exceeded", None: "is not decided"}[kept]
 
     @property
     def event(self) -> str:
         """Verb for the event that has a probability."""
-        return "is violated" if self.is_required else "is passed"
+        return "is violated" if self.is_required else "is exceeded"
 
     def _on_side(self, above: bool) -> str:
         named = f"{self.place}.{self.quantity}" if self.place else self.quantity
@@ -100,7 +100,7 @@ class Limit:
         return np.append(0.0, times) if self.is_dynamic and times[0] > 0.0 else times
 
     def tightened(self, off: float) -> Limit:
-        """The limit that is passed by so much less, in its unit."""
+        """The limit that is exceeded by so much less, in its unit."""
         return replace(self, bound=self.bound - off if self.above else self.bound + off)
 
     def margin(self, of: Array) -> Array:

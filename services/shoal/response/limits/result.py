@@ -22,7 +22,7 @@ from shoal.response.limits.margin_errors import MarginErrors
 from shoal.trajectory import Array, plain
 
 NEARLY_SURE = 0.99
-"""A limit that is passed with a higher probability may have been stated the other way round."""
+"""A limit that is exceeded with a higher probability may have been stated the other way round."""
 MOST_BEYOND = 0.25
 """Reliability index by which interval values that were not looked at may lie beyond, and no more."""
 
