@@ -37,8 +37,8 @@ def test_of_a_place_of_rest() -> None:
     found, true = shoal.statics(BEAM), shoal.statics(BEAM, set=finest(12), verify=False)
     error = float(np.linalg.norm(found.marker("tip") - true.marker("tip")))
     assert found.marker("tip")[1] < -0.1
-    assert found.mesh_error == pytest.approx(error, rel=0.5)
-    assert true.mesh_error is None
+    assert found.errors.estimates["mesh"] == pytest.approx(error, rel=0.5)
+    assert "mesh" not in true.errors.estimates
 
 
 def test_of_modes() -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from shoal.engines import get_engine
 from shoal.engines.verification import Verification, verified
+from shoal.error_budget import ErrorBudget
 from shoal.errors import InputError
 from shoal.mechanics.analysis.modes import modes
 from shoal.mechanics.analysis.reactions import reactions
@@ -236,7 +237,7 @@ def test_rods_that_bend_far_are_not_believed() -> None:
     error = found.model["verification"]["bending_error"]
     assert error > 0.05
     assert "that modal rods bend more than a little is worth" in found.message
-    assert "use element: ancf-cable" in Verification(0.0, 0.0, 5.0 * error, bending_error=error).complaint
+    assert "use element: ancf-cable" in Verification(ErrorBudget({"bending": error}), 5.0 * error).complaint
 
 
 def test_a_rod_that_turns_faster_than_it_vibrates_flies_apart_and_is_told_why() -> None:

@@ -10,7 +10,7 @@ these runs too; those of other engines' are local.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -36,49 +36,40 @@ SMALLER = "a smaller solver.step, or solver.relative_tolerance and solver.absolu
 
 @dataclass(frozen=True)
 class Verification:
-    """Estimated errors of a run at its markers [m], None where they were not estimated and `note` says why.
+    """Estimated errors of a run at its markers.
 
-    time_error: against a more careful run of the same mesh; mesh_error: against twice as many elements, a third more
-    than the two differ by, as the finer mesh has an error too (`LEFT`);
-    theory_error: what the rods' theory leaves out, friction_error: how far what should stick creeps, as dry friction is
-    smoothed, bending_error: of modal rods, against cables that may bend far, each None where there is nothing of the
-    kind; scale: how far the markers get from the ground [m];
-    rejected: why the more careful run is itself not to be trusted; engine: that made the run, if it is not the native
-    one, from which that of time is then how far it is off, whichever of them is wrong; not_estimated: sources whose
-    error is of interest and not known; deviations: the second runs, which estimate the error of any other quantity too
+    errors: numerical errors, and what the model leaves out [m], by the names of `SOURCES`; unknown where a source could
+    not be estimated, and `note` says why; angle_error: of the time step [rad]; scale: how far the markers get from the
+    ground [m]; rejected: why the more careful run is itself not to be trusted; engine: that made the run, if it is not
+    the native one, from which that of time is then how far it is off, whichever of them is wrong; deviations: the
+    second runs, which estimate the error of any other quantity too
     """
 
-    time_error: float | None
-    mesh_error: float | None
+    errors: ErrorBudget
     scale: float
     note: str = ""
     rejected: str = ""
-    theory_error: float | None = None
-    friction_error: float | None = None
-    bending_error: float | None = None
     angle_error: float | None = None
     engine: str = ""
-    not_estimated: tuple[str, ...] = ()
     deviations: tuple[Deviation, ...] = field(default=(), repr=False, compare=False)
 
-    @property
-    def errors(self) -> ErrorBudget:
-        """All that is known of how far the markers are off [m]: numerical errors, and what the model leaves out."""
-        known = {source.name: getattr(self, f"{source.name}_error") for source in SOURCES}
-        return ErrorBudget(
-            {source: error for source, error in known.items() if error is not None or source in self.not_estimated}
-        )
+    def error(self, source: str) -> float:
+        """Return the known error of a source [m]; 0 where none is known."""
+        return self.errors.known.get(source, 0.0)
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data, for `model["verification"]`."""
-        return dict(plain({one.name: getattr(self, one.name) for one in fields(self) if one.compare}))
+        names = ("scale", "note", "rejected", "angle_error", "engine")
+        found = {f"{source.name}_error": self.errors.estimates.get(source.name) for source in SOURCES}
+        found |= {name: getattr(self, name) for name in names} | {"not_estimated": self.errors.unknown}
+        return dict(plain(found))
 
     @property
     def complaint(self) -> str:
         """Return the reason for rejecting the run; empty if it is accepted."""
         if self.rejected:
             return f"a more careful run is rejected ({self.rejected}); use {SMALLER}"
-        found = (self.time_error or 0.0, WRONG * self.scale, "m"), (self.angle_error or 0.0, WRONG, "rad")
+        found = (self.error("time"), WRONG * self.scale, "m"), (self.angle_error or 0.0, WRONG, "rad")
         for error, allowed, unit in found:
             if error > allowed and self.engine:
                 return (
@@ -91,11 +82,11 @@ class Verification:
                     f"the time error is about {error:.2g} {unit}: use {SMALLER}, "
                     "or a shorter solver.duration if the motion is chaotic"
                 )
-        if self.mesh_error is not None and self.mesh_error > WRONG * self.scale:
-            return f"the mesh error is about {self.mesh_error:.2g} m: use more elements, or --tolerance to find them"
-        if (self.bending_error or 0.0) > WRONG * self.scale:
+        if self.error("mesh") > WRONG * self.scale:
+            return f"the mesh error is about {self.error('mesh'):.2g} m: use more elements, or --tolerance to find them"
+        if self.error("bending") > WRONG * self.scale:
             return (
-                f"modal rods bend too far: cables, which may, end about {self.bending_error:.2g} m away; "
+                f"modal rods bend too far: cables, which may, end about {self.error('bending'):.2g} m away; "
                 "use element: ancf-cable"
             )
         return ""
@@ -103,13 +94,14 @@ class Verification:
     @property
     def warning(self) -> str:
         """Return a remark on errors that are large and do not reject the run; empty if there are none."""
-        found = [self.note] if self.time_error is None and self.note else []
-        if (self.theory_error or 0.0) > WORTH * self.scale:
-            found.append(f"shear and rotary inertia that slender rods leave out are worth {self.theory_error:.2g} m")
-        if (self.bending_error or 0.0) > WORTH * self.scale:
-            found.append(f"that modal rods bend more than a little is worth {self.bending_error:.2g} m")
-        if (self.friction_error or 0.0) > WORTH * self.scale:
-            found.append(f"what dry friction should hold creeps by {self.friction_error:.2g} m; lower coulomb_speed")
+        found = [self.note] if self.note and "time" not in self.errors.known else []
+        for source, remark in (
+            ("theory", "shear and rotary inertia that slender rods leave out are worth {:.2g} m"),
+            ("bending", "that modal rods bend more than a little is worth {:.2g} m"),
+            ("friction", "what dry friction should hold creeps by {:.2g} m; lower coulomb_speed"),
+        ):
+            if self.error(source) > WORTH * self.scale:
+                found.append(remark.format(self.error(source)))
         return "; ".join(found)
 
 
@@ -145,8 +137,8 @@ def verify(trajectory: Trajectory, scene: Scene, native: Engine | None = None) -
     concerned = [source for source in SOURCES if source.concerns(scene)]
     if "unknowns" not in trajectory.model:
         note = f"errors not estimated: {trajectory.engine} does not tell its unknowns"
-        missing = tuple(source.name for source in concerned if source.name in ("time", "mesh"))
-        return Verification(None, None, scale, note, not_estimated=missing)
+        unknown = {source.name: None for source in concerned if source.name in ("time", "mesh")}
+        return Verification(ErrorBudget(unknown), scale, note)
     seen = Examined(trajectory, scene, scale, native or GaussEngine())
     found: dict[str, list[Deviation] | None] = {}
     notes = []
@@ -154,21 +146,19 @@ def verify(trajectory: Trajectory, scene: Scene, native: Engine | None = None) -
         try:
             found[source.name], note = source.look(seen)
         except Rejected as rejected:
-            return Verification(None, None, scale, rejected=str(rejected), not_estimated=(source.name,))
+            return Verification(ErrorBudget({source.name: None}), scale, rejected=str(rejected))
         notes.append(note)
-    errors = {name: sum(one.distance for one in each) if each else None for name, each in found.items()}
+    # A source of no second runs, as of theory in a machine without slender rods, has no error.
+    errors = {
+        name: None if each is None else sum(one.distance for one in each) for name, each in found.items() if each != []
+    }
     in_time = found["time"]
     return Verification(
-        errors["time"],
-        errors.get("mesh"),
+        ErrorBudget(errors),
         scale,
         "; ".join(filter(None, notes)),
-        theory_error=errors.get("theory"),
-        friction_error=errors.get("friction"),
-        bending_error=errors.get("bending"),
         angle_error=in_time[0].angle if in_time else None,
         engine="" if trajectory.engine == GaussEngine().name else trajectory.engine,
-        not_estimated=tuple(name for name, each in found.items() if each is None),
         deviations=tuple(one for each in found.values() for one in each or ()),
     )
 

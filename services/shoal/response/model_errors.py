@@ -117,7 +117,7 @@ class _Nothing:
         """Return whether these errors are nothing; None where the run has failed."""
         if estimated is None or estimated.rejected:
             return False
-        errors = (estimated.errors.known.get(source, 0.0) for source in ("time", "mesh", "bending"))
+        errors = (estimated.error(source) for source in ("time", "mesh", "bending"))
         return max(errors) <= self.length and (estimated.angle_error or 0.0) <= self.angle
 
     def __str__(self) -> str:

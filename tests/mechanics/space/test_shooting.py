@@ -90,7 +90,7 @@ def test_a_random_rod_converges_to_kirchhoffs_and_its_mesh_error_is_told() -> No
     """It is a third more than what twice as many elements change."""
     error, _ = check(0, (6, 12))
     one = scene(*drawn(0), 6)
-    told = of_equilibrium(statics(one), one).mesh_error
+    told = of_equilibrium(statics(one), one).errors.estimates["mesh"]
     assert told is not None
     assert error <= told <= 1.3 * error
 

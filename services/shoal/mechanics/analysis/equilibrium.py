@@ -32,9 +32,8 @@ class Equilibrium:
     stable, but where forces follow the motion; levels: below these each is zero to working accuracy. steps: load steps.
     reactions: in the joints, None where the forces do not balance or where they were not asked for.
     turns: angles [rad] that force elements have counted, by joint or load.
-    mesh_error: how far the markers are from the limit of ever finer meshes [m], theory_error: from where rods with
-    shear rest, each None where it is not known; not_estimated: sources whose error is of interest and not known;
-    estimated: whether errors were looked for.
+    estimates: errors of the markers [m] by source, of the mesh and of the theory of slender rods, None where one is not
+    known; None where none were looked for.
     """
 
     scene: Scene
@@ -57,10 +56,7 @@ class Equilibrium:
     steps: int
     reactions: Reactions | None = field(repr=False)
     turns: Mapping[str, Sequence[float]] = field(repr=False)
-    mesh_error: float | None = None
-    theory_error: float | None = None
-    not_estimated: tuple[str, ...] = ()
-    estimated: bool = False
+    estimates: Mapping[str, float | None] | None = None
 
     @property
     def status(self) -> EquilibriumStatus:
@@ -85,12 +81,10 @@ class Equilibrium:
     @property
     def errors(self) -> ErrorBudget:
         """Known errors of the markers [m]; that of the solver is its last correction."""
-        if not self.estimated:
+        if self.estimates is None:
             return ErrorBudget()
-        known = {"mesh": self.mesh_error, "theory": self.theory_error}
-        found = {name: error for name, error in known.items() if error is not None or name in self.not_estimated}
         solver = {"solver": float(self.correction) * span(self.scene)} if np.isfinite(self.correction) else {}
-        return ErrorBudget({**found, **solver})
+        return ErrorBudget({**self.estimates, **solver})
 
     @property
     def grade(self) -> Grade:
@@ -140,8 +134,8 @@ class Equilibrium:
             "energy": self.energy,
             "strain_energy": self.strain_energy,
             "residual": self.residual,
-            "mesh_error": self.mesh_error,
-            "theory_error": self.theory_error,
+            "mesh_error": self.errors.estimates.get("mesh"),
+            "theory_error": self.errors.estimates.get("theory"),
             "error": plain(self.errors.total),
             "errors": plain(self.errors.to_json()),
             "constraint_gap": self.gap,

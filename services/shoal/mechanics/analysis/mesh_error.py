@@ -1,4 +1,4 @@
-"""Errors of places of rest and modes: the same computation on a finer mesh and with shear, compared.
+"""Errors of equilibria, modes and reactions: the same computation on a finer mesh and with shear, compared.
 
 The error of the mesh follows by Richardson extrapolation, from twice as many elements of all bodies.
 
@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Literal, TypeVar
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from shoal.mechanics.analysis.campbell import Campbell, campbell
 from shoal.mechanics.analysis.equilibrium import Equilibrium
 from shoal.mechanics.analysis.modes import Modes, modes
 from shoal.mechanics.analysis.statics import statics
+from shoal.mechanics.numerics.tile import Array
 from shoal.scene import Scene
 from shoal.scene.refined import refined
 from shoal.scene.shear import stouter
@@ -50,20 +51,35 @@ def beyond(gap: float, last: float = np.nan) -> float:
     return max(gap, last / FALLS[1]) / (fall - 1.0)
 
 
-def second_runs(scene: Scene, run: Callable[[str, Scene], T], *, exact: bool = True) -> dict[str, T | None]:
-    """Return a computation by source of error: on a finer mesh, and with the shear and inertia that slender rods lack.
+def estimates(
+    found: Sequence[T | None],
+    scene: Scene,
+    run: Callable[[str, Scene], Sequence[T | None]],
+    apart: Callable[[T, T], Array | float | None],
+    *,
+    exact: bool = True,
+) -> list[dict[str, Any]]:
+    """Return the errors of each of some results, by source: their distances from those of more careful runs.
 
-    A source that the scene does not have is left out; None where a computation fails. run: of a source and its scene;
-    exact: see `stouter`
+    These are on a finer mesh, and with the shear and inertia that slender rods lack. A source that the scene does not
+    have is left out; None where the run fails, or has no such result. run: computes the results again, of a source and
+    its scene; apart: distance of two, None where they cannot be compared; exact: see `stouter`
     """
-    found: dict[str, T | None] = {}
-    for source, other in (("mesh", finer(scene)), ("theory", stouter(scene, exact=exact))):
-        if other is not None:
-            try:
-                found[source] = run(source, other)
-            except ShoalError:
-                found[source] = None
-    return found
+    errors: list[dict[str, Any]] = [{} for _ in found]
+    for source, other, worth in (
+        ("mesh", finer(scene), 1.0 + beyond(1.0)),
+        ("theory", stouter(scene, exact=exact), 1.0),
+    ):
+        if other is None:
+            continue
+        try:
+            second = run(source, other)
+        except ShoalError:
+            second = [None] * len(found)
+        for one, two, by_source in zip(found, second, errors, strict=True):
+            away = None if one is None or two is None else apart(one, two)
+            by_source[source] = None if away is None else worth * away
+    return errors
 
 
 def of_equilibrium(found: Equilibrium, scene: Scene) -> Equilibrium:
@@ -74,17 +90,14 @@ def of_equilibrium(found: Equilibrium, scene: Scene) -> Equilibrium:
     if not found.ok:
         return found
     if not any(scene.flexible_rods):
-        return replace(found, estimated=True)
-    runs = second_runs(scene, lambda _, other: statics(other, found.time, reactions=False))
-    gaps = {source: apart(found, other) if other is not None and other.ok else None for source, other in runs.items()}
-    gap = gaps.get("mesh")
-    return replace(
-        found,
-        mesh_error=None if gap is None else gap + beyond(gap),
-        theory_error=gaps.get("theory"),
-        not_estimated=tuple(source for source, away in gaps.items() if away is None),
-        estimated=True,
-    )
+        return replace(found, estimates={})
+
+    def run(_: str, other: Scene) -> list[Equilibrium | None]:
+        second = statics(other, found.time, reactions=False)
+        return [second if second.ok else None]
+
+    (errors,) = estimates([found], scene, run, apart)
+    return replace(found, estimates=errors)
 
 
 def apart(one: Equilibrium, other: Equilibrium) -> float:
@@ -99,7 +112,13 @@ def of_modes(found: Modes, scene: Scene) -> Modes:
     """
     if not found.ok:
         return found
-    return _with_errors([found], scene, lambda other: [_modes(found, other)])[0] or found
+
+    def run(_: str, other: Scene) -> list[Modes | None]:
+        second = modes(other, about=_about(found.about), count=len(found.modes))
+        return [second if second.ok else None]
+
+    (errors,) = estimates([found], scene, run, _gaps)
+    return replace(found, estimates=errors)
 
 
 def of_campbell(found: Campbell, scene: Scene) -> Campbell:
@@ -108,51 +127,23 @@ def of_campbell(found: Campbell, scene: Scene) -> Campbell:
         return found
     count = max((len(one.modes) for one in found.modes if one), default=1)
 
-    def run(other: Scene) -> Sequence[Modes | None]:
+    def run(_: str, other: Scene) -> Sequence[Modes | None]:
         return campbell(other, found.speeds, about=_about(found.about), count=count).modes
 
-    return replace(found, modes=tuple(_with_errors(found.modes, scene, run)))
-
-
-def _modes(found: Modes, scene: Scene) -> Modes | None:
-    """Those of another scene; None where it has none."""
-    second = modes(scene, about=_about(found.about), count=len(found.modes))
-    return second if second.ok else None
+    pairs = zip(found.modes, estimates(found.modes, scene, run, _gaps), strict=True)
+    return replace(found, modes=tuple(one and replace(one, estimates=errors) for one, errors in pairs))
 
 
 def _about(about: str) -> Literal["equilibrium", "start"]:
     return "start" if about == "start" else "equilibrium"
 
 
-def _with_errors(
-    found: Sequence[Modes | None], scene: Scene, run: Callable[[Scene], Sequence[Modes | None]]
-) -> list[Modes | None]:
-    """Modes with the errors of their eigenvalues. run: those of another scene, in the same order"""
-    runs = second_runs(scene, lambda _, other: run(other))
-    told = list[Modes | None]()
-    for number, one in enumerate(found):
-        if one is None:
-            told.append(None)
-            continue
-        gaps = {source: _gaps(one, second[number] if second else None) for source, second in runs.items()}
-        told.append(
-            replace(
-                one,
-                mesh_errors=tuple(gap + beyond(gap) for gap in gaps.get("mesh", ())),
-                theory_errors=gaps.get("theory", ()),
-                not_estimated=tuple(source for source, errors in gaps.items() if not errors),
-                estimated=True,
-            )
-        )
-    return told
-
-
-def _gaps(found: Modes, second: Modes | None) -> tuple[float, ...]:
-    """Return the relative distances of the eigenvalues from those of a second run; none where it has fewer modes."""
-    if second is None or len(second.modes) < len(found.modes):
-        return ()
+def _gaps(found: Modes, second: Modes) -> Array | None:
+    """Return the relative distances of the eigenvalues from those of a second run; None where it has fewer modes."""
+    if len(second.modes) < len(found.modes):
+        return None
     pairs = zip(found.modes, second.modes, strict=False)
-    return tuple(_apart(one.eigenvalue, other.eigenvalue) for one, other in pairs)
+    return np.array([_apart(one.eigenvalue, other.eigenvalue) for one, other in pairs])
 
 
 def _apart(one: complex, other: complex) -> float:

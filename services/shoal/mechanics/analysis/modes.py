@@ -7,6 +7,7 @@ equilibrium these are the motions relative to its fall. Dry friction is left out
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -111,10 +112,10 @@ class Eigenmode:
 class Modes:
     """The lowest modes about a state q, slowest first (unstable ones before all). balanced: whether forces balance.
 
-    mesh_errors: how far each eigenvalue is from the limit of ever finer meshes, theory_errors: from that with shear and
-    rotary inertia, relative; empty if not known. speed: of the steady motion that they are about [rad/s], None at rest;
-    moving: why the motion of the start, which is left out, is no steady one; not_estimated: sources whose error is of
-    interest and not known; estimated: whether errors were looked for
+    speed: of the steady motion that they are about [rad/s], None at rest; moving: why the motion of the start, which is
+    left out, is no steady one. estimates: relative errors of the eigenvalues by source, (modes,): how far each is from
+    the limit of ever finer meshes, and from that with shear and rotary inertia, None where not known; None where
+    none were looked for
     """
 
     scene: Scene
@@ -124,28 +125,27 @@ class Modes:
     q: Array
     markers: tuple[str, ...]
     modes: tuple[Eigenmode, ...]
-    mesh_errors: tuple[float, ...] = ()
     speed: float | None = None
     moving: str = ""
-    theory_errors: tuple[float, ...] = ()
-    not_estimated: tuple[str, ...] = ()
-    estimated: bool = False
+    estimates: Mapping[str, Array | None] | None = None
 
     @property
     def errors(self) -> tuple[ErrorBudget, ...]:
         """Known errors of each eigenvalue, relative; of a rigid machine without rods, nothing is left out."""
-        if not self.estimated:
+        if self.estimates is None:
             return (ErrorBudget({}, RELATIVE),) * len(self.modes)
-        known = {"mesh": self.mesh_errors, "theory": self.theory_errors}
-        sources = {name: errors for name, errors in known.items() if errors}
-        lacking = dict.fromkeys(self.not_estimated)
-        each = range(len(self.modes))
         digits = float(np.finfo(float).eps) if self.speed is None else EXACT
-        rounding = {} if sources or lacking else {"rounding": digits}
+        sources = self.estimates or {"rounding": np.full(len(self.modes), digits)}
         return tuple(
-            ErrorBudget({**{name: errors[k] for name, errors in sources.items()}, **lacking, **rounding}, RELATIVE)
-            for k in each
+            ErrorBudget({name: None if each is None else float(each[k]) for name, each in sources.items()}, RELATIVE)
+            for k in range(len(self.modes))
         )
+
+    @property
+    def mesh_errors(self) -> tuple[float, ...]:
+        """Relative errors of the mesh, one for each mode; empty if not known."""
+        found = None if self.estimates is None else self.estimates.get("mesh")
+        return () if found is None else tuple(found.tolist())
 
     @property
     def ok(self) -> bool:
@@ -229,8 +229,8 @@ class Modes:
                     "growth": mode.eigenvalue.real,
                     "whirl": mode.whirl,
                     "frame": mode.frame,
-                    "mesh_error": self.mesh_errors[number] if self.mesh_errors else None,
-                    "theory_error": self.theory_errors[number] if self.theory_errors else None,
+                    "mesh_error": self.errors[number].estimates.get("mesh"),
+                    "theory_error": self.errors[number].estimates.get("theory"),
                     "error": self.errors[number].total,
                     "shape": {
                         name: {

@@ -7,7 +7,7 @@ the run as stated is off, but two more careful ones agree, theirs are returned.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -16,10 +16,11 @@ import numpy as np
 from shoal.error_budget import ErrorBudget
 from shoal.errors import ComputationError
 from shoal.mechanics.analysis.joint_reactions import Reactions
-from shoal.mechanics.analysis.mesh_error import beyond, second_runs
+from shoal.mechanics.analysis.mesh_error import estimates
 from shoal.mechanics.analysis.reactions import reactions
 from shoal.mechanics.integrators import STRIDES, facts, pick
 from shoal.mechanics.machine import Machine
+from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
 from shoal.mechanics.stability import step_limit
 from shoal.scene import Scene
@@ -41,70 +42,57 @@ def verified(scene: Scene, times: Sequence[float]) -> list[Reactions]:
     the mesh and of the theory of slender rods are added to those of the steps.
     """
     stated = reactions(scene, times)
-    found = _in_time(stated, scene, times)
-    sources = {"time": _largest(found)}
+    found, other, message = _in_time(stated, scene, times)
 
-    def run(source: str, other: Scene) -> list[Reactions]:
+    def run(source: str, finer: Scene) -> list[Reactions]:
         # Elements of half the length need half the step.
         shorter = {"solver.step": 0.5 * scene.solver.step} if source == "mesh" else {}
-        return _with_differences(stated, reactions(other.with_values(shorter), times))
+        return reactions(finer.with_values(shorter), times)
 
-    for source, away in second_runs(scene, run, exact=False).items():
-        if away is None:
-            sources[source] = None
-            continue
-        factor = 1.0 + beyond(1.0) if source == "mesh" else 1.0
-        found = [_with(one, two, factor) for one, two in zip(found, away, strict=True)]
-        sources[source] = factor * (_largest(away) or 0.0)
-    return [replace(one, errors=ErrorBudget(sources, "N")) for one in found]
-
-
-def _largest(found: list[Reactions]) -> float | None:
-    """The largest error of a force [N]; None where none is known."""
-    errors = [joint.force_error for one in found for joint in one.joints.values()]
-    return max((error for error in errors if error is not None), default=0.0 if not errors else None)
+    steps = [None] * len(times) if other is None else list(map(_differences, found, other))
+    others = estimates(stated, scene, run, _differences, exact=False)
+    errors = [{"time": one, **more} for one, more in zip(steps, others, strict=True)]
+    largest = {source: _largest([one[source] for one in errors]) for source in errors[0]}
+    settled = not message or found is not stated
+    return [
+        replace(_with_errors(one, each), settled=settled, message=message, errors=ErrorBudget(largest, "N"))
+        for one, each in zip(found, errors, strict=True)
+    ]
 
 
-def _with(found: Reactions, other: Reactions, factor: float) -> Reactions:
-    """Return reactions with the errors of another run, times a factor, added."""
-    joints = {}
-    for name, joint in found.joints.items():
-        more = other.joints[name]
-        force = (joint.force_error or 0.0) + factor * (more.force_error or 0.0)
-        torque = (joint.torque_error or 0.0) + factor * (more.torque_error or 0.0)
-        joints[name] = replace(joint, force_error=force, torque_error=torque)
-    return replace(found, joints=joints)
+def _in_time(
+    stated: list[Reactions], scene: Scene, times: Sequence[float]
+) -> tuple[list[Reactions], list[Reactions] | None, str]:
+    """Return the reactions that are believed most, those of the run that they are compared with, and what is wrong.
 
-
-def _in_time(stated: list[Reactions], scene: Scene, times: Sequence[float]) -> list[Reactions]:
-    """With their errors in time, on the mesh as stated."""
-    runs = [stated]
+    All on the mesh as stated; no other run where there is none.
+    """
     if not any(times):
-        return _with_differences(runs[0], runs[0])
-    lever, off, why = span(scene), np.inf, ""
+        return stated, stated, ""
+    runs, lever, off, why = [stated], span(scene), np.inf, ""
     for settings in _others(scene):
         try:
             another = reactions(scene.with_values(settings), times)
         except ComputationError as error:
             why = why or str(error)
             continue
-        if _apart(runs[0], another, lever) <= SHARE:
-            return _with_differences(runs[0], another)
-        off = min(off, _apart(runs[0], another, lever))
+        if _apart(stated, another, lever) <= SHARE:
+            return stated, another, ""
+        off = min(off, _apart(stated, another, lever))
         if any(_apart(one, another, lever) <= SHARE for one in runs[1:]):
             nearest = min(runs[1:], key=lambda one: _apart(one, another, lever))
-            message = f"the run as stated is off by about {off:.0%} of the largest force; told are those with "
             name, tolerance = settings["solver.integrator"], settings["solver.relative_tolerance"]
-            message += f"solver.integrator={name}, solver.relative_tolerance={tolerance:g}"
-            return _with_differences(another, nearest, message)
+            return another, nearest, (
+                f"the run as stated is off by about {off:.0%} of the largest force; told are those with "
+                f"solver.integrator={name}, solver.relative_tolerance={tolerance:g}"
+            )  # fmt: skip
         runs.append(another)
     if len(runs) == 1:
-        return [replace(one, settled=False, message=f"errors of forces not estimated: {why}") for one in runs[0]]
-    advice = (
+        return stated, None, f"errors of forces not estimated: {why}"
+    return stated, runs[-1], (
         f"forces are off by about {off:.0%} of the largest: use a smaller solver.step, or solver.integrator=dop853 "
         "with a smaller solver.relative_tolerance, or earlier times if the motion is chaotic"
-    )
-    return [replace(one, settled=False) for one in _with_differences(runs[0], runs[-1], advice)]
+    )  # fmt: skip
 
 
 def _others(scene: Scene) -> Iterator[dict[str, Any]]:
@@ -133,32 +121,36 @@ def _others(scene: Scene) -> Iterator[dict[str, Any]]:
             }
 
 
-def _with_differences(found: list[Reactions], other: list[Reactions], message: str = "") -> list[Reactions]:
-    """Return reactions whose errors are their differences from those of another run."""
-    told = []
-    for one, two in zip(found, other, strict=True):
-        joints = {}
-        for name, joint in one.joints.items():
-            force, torque = (
-                float(np.linalg.norm(np.subtract(getattr(joint, part), getattr(two.joints[name], part))))
-                for part in ("force", "torque")
-            )
-            joints[name] = replace(joint, force_error=force, torque_error=torque)
-        told.append(replace(one, joints=joints, message=message))
-    return told
+def _differences(one: Reactions, other: Reactions) -> Array:
+    """Return the distances of the force [N] and of the torque [N m] of every joint, (joints, 2)."""
+    pairs = [(joint, other.joints[name]) for name, joint in one.joints.items()]
+    return _sizes([(np.subtract(a.force, b.force), np.subtract(a.torque, b.torque)) for a, b in pairs])
+
+
+def _sizes(vectors: Iterable[tuple[Any, Any]]) -> Array:
+    """Return the sizes of forces and torques, (joints, 2)."""
+    return np.array([list(map(np.linalg.norm, pair)) for pair in vectors]).reshape(-1, 2)
 
 
 def _apart(found: list[Reactions], other: list[Reactions], lever: float) -> float:
     """The largest error over the largest force at these times, torques counted at a lever [m]; nan if one is none."""
-    errors = [
-        max(joint.force_error or 0.0, (joint.torque_error or 0.0) / lever)
-        for one in _with_differences(found, other)
-        for joint in one.joints.values()
-    ]
-    sizes = [
-        max(float(np.linalg.norm(joint.force)), float(np.linalg.norm(joint.torque)) / lever)
-        for one in other
-        for joint in one.joints.values()
-    ]
-    error, floor = max(errors, default=0.0), CANCELLED * max(one.scale for one in other)
-    return 0.0 if error <= floor else error / max(sizes)
+    units = np.array([1.0, lever])
+    error = np.max([_differences(one, two) / units for one, two in zip(found, other, strict=True)], initial=0.0)
+    sizes = [_sizes((joint.force, joint.torque) for joint in one.joints.values()) / units for one in other]
+    return 0.0 if error <= CANCELLED * max(one.scale for one in other) else float(error / np.max(sizes))
+
+
+def _with_errors(found: Reactions, errors: Mapping[str, Array | None]) -> Reactions:
+    """Return reactions with the sum of the known errors of each joint."""
+    known = [each for each in errors.values() if each is not None]
+    if not known:
+        return found
+    pairs = zip(found.joints.items(), np.sum(known, axis=0).tolist(), strict=True)
+    joints = {name: replace(joint, force_error=force, torque_error=torque) for (name, joint), (force, torque) in pairs}
+    return replace(found, joints=joints)
+
+
+def _largest(errors: list[Array | None]) -> float | None:
+    """Return the largest error of a force at all times [N]; None where it is not known."""
+    known = [each[:, 0] for each in errors if each is not None]
+    return float(np.max(known, initial=0.0)) if known else None

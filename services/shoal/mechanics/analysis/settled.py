@@ -36,7 +36,8 @@ def settled(scene: Scene, tolerance: float, time: float = 0.0) -> Equilibrium:
         return found
     other = statics(stout, time)
     away = apart(found, other) if found.ok and other.ok else np.nan
-    found = replace(found, **({"theory_error": away} if np.isfinite(away) else {"not_estimated": ("theory",)}))
+    if found.estimates is not None:
+        found = replace(found, estimates={**found.estimates, "theory": away if np.isfinite(away) else None})
     if SAFE * away <= tolerance:
         return found
     other = _refined(stout, tolerance, time, other)
@@ -62,7 +63,7 @@ def _refined(scene: Scene, tolerance: float, time: float, begun: Equilibrium | N
             continue
         gap = apart(coarse, found)
         error = beyond(gap, last)
-        found = replace(found, mesh_error=error, estimated=True)
+        found = replace(found, estimates={"mesh": error})
         if SAFE * error <= tolerance:
             return found
     if not found.ok:

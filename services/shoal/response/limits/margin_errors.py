@@ -37,7 +37,7 @@ def margin_errors(limit: Limit, verification: Verification | None, instants: int
     bending = any(any(one.scenes[0].flexible_rods) for one in verification.deviations)
     found = by_source(verification.deviations, lambda one: _error(limit, one, bending)[-instants:])
     largest: dict[str, float | None] = {source: float(error.max()) for source, error in found.items()}
-    lacking = dict.fromkeys(verification.not_estimated)
+    lacking = dict.fromkeys(verification.errors.unknown)
     over_time = sum(found.values(), np.zeros(instants))
     return MarginErrors(ErrorBudget({**lacking, **largest}, limit.unit), over_time)
 
