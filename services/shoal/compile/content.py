@@ -8,6 +8,7 @@ those kernels again that it reaches; comments, docstrings and moved lines reach 
 from __future__ import annotations
 
 import hashlib
+import opcode
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -96,12 +97,13 @@ def _parts(function: FunctionType, chosen: frozenset[type]) -> tuple[bytes, list
         kernels = [kernel for kind, kernel in ALTERNATIVES[function] if kind in chosen]
         return b"", [getattr(kernel, "py_func", kernel) for kernel in kernels]
     digest = hashlib.sha256(f"{function.__module__}.{function.__qualname__} {function.__defaults__}".encode())
-    callees, names = _overloads(function), list[str]()
+    callees, names, attributes = _overloads(function), set[str](), set[str]()
     for code in _codes(function.__code__):
         constants = tuple(one for one in code.co_consts if not isinstance(one, CodeType) and one != function.__doc__)
         digest.update(code.co_code + _constant((constants, code.co_names, code.co_varnames)))
-        names += code.co_names
-    for name, value in sorted(_globals(function, names).items()):
+        names.update(_global_names(code))
+        attributes.update(code.co_names)
+    for name, value in sorted(_globals(function, names, attributes).items()):
         if isinstance(value, Dispatcher):
             digest.update(f"{name}: ".encode() + _constant(value.targetoptions))
             callees.append(value.py_func)
@@ -128,11 +130,27 @@ def _codes(code: CodeType) -> Iterator[CodeType]:
             yield from _codes(constant)
 
 
-def _globals(function: FunctionType, names: list[str]) -> dict[str, Any]:
-    """Return what the names in a function stand for, those in modules of this library as `module.name`."""
+_LOAD_GLOBAL = opcode.opmap["LOAD_GLOBAL"]
+
+
+def _global_names(code: CodeType) -> Iterator[str]:
+    """Yield the names that are looked up in the module: `b`, but not the attribute `a` of `b.a`.
+
+    The module may have another `a`, which may be a table that fills while a program runs.
+    """
+    extended = 0
+    for operation, argument in zip(code.co_code[::2], code.co_code[1::2], strict=True):
+        argument |= extended
+        extended = argument << 8 if operation == opcode.EXTENDED_ARG else 0
+        if operation == _LOAD_GLOBAL:
+            yield code.co_names[argument >> 1]  # the last bit says whether it is called
+
+
+def _globals(function: FunctionType, names: set[str], attributes: set[str]) -> dict[str, Any]:
+    """Return what the names in a function stand for, attributes of modules of this library as `module.name`."""
     found = {name: function.__globals__[name] for name in names if name in function.__globals__}
     for module in [value for value in found.values() if _is_own_module(value)]:
-        found |= {f"{module.__name__}.{name}": vars(module)[name] for name in names if name in vars(module)}
+        found |= {f"{module.__name__}.{name}": vars(module)[name] for name in attributes if name in vars(module)}
     return {name: value for name, value in found.items() if not _is_own_module(value)}
 
 
