@@ -247,3 +247,56 @@ def test_a_planar_loop_whose_pivots_are_not_in_one_plane_is_refused(spin: float)
         start.place_started(Scene.parse(scene))
     scene["joints"]["J3"]["first"]["point"] = [1, 0, 0]  # type: ignore[index]
     assert not np.any(start.place_started(Scene.parse(scene)).failed)
+
+
+def driven_machine(dimensions: int, drawn: np.random.Generator, closing: float | None) -> Scene:
+    """A driven crank with a free arm; closing: the rate [m/s] of a distance from its end to a third bar, if any."""
+    angles, lengths = drawn.uniform(-1, 1, 3) + np.array([0.3, 0.6, 1.3]), drawn.uniform(0.7, 1.3, 3)
+    masses, inertias = drawn.uniform(0.5, 2, 3), drawn.uniform(0.05, 0.4, 3)
+    drive = f"{float(angles[0])!r} + {drawn.uniform(-3, 3)!r}*t"
+    space = dimensions == 3
+
+    def place(x: float, y: float) -> list[float]:
+        return [x, y, 0.0][:dimensions]
+
+    def bar(k: int) -> dict[str, Any]:
+        inertia = [0.5 * inertias[k], 0.9 * inertias[k], inertias[k]] if space else inertias[k]
+        named = {"end": place(lengths[k], 0.0)}
+        return {"kind": "rigid-body", "mass": masses[k], "inertia": inertia, "named_points": named,
+                "centre_of_mass": place(lengths[k] / 2, 0.0)}  # fmt: skip
+
+    ends = lengths[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    apart = float(np.linalg.norm(ends[0] + ends[1] - ends[2] - [1.2, 0.1]))
+    origin, pivot = ({"body": "ground", "point": place(*at)} for at in ((0.0, 0.0), (1.2, 0.1)))
+    bodies = {name: bar(k) for k, name in enumerate("xyz"[: 2 if closing is None else 3])}
+    joints: dict[str, Any] = {
+        "A": {"first": origin, "second": {"body": "x"}},
+        "B": {"first": {"body": "x", "point": "end"}, "second": {"body": "y"}},
+        "D": {
+            "kind": "driven-angle",
+            "first": origin,
+            "second": {"body": "x"},
+            "angle": drive,
+        },
+    }
+    if closing is not None:
+        sides = {"first": {"body": "y", "point": "end"}, "second": {"body": "z", "point": "end"}}
+        joints["C"] = {"first": pivot, "second": {"body": "z"}}
+        joints["E"] = {"kind": "distance", **sides, "length": f"{apart!r} + {closing!r}*t"}
+    start = {name: {"rotation": [0, 0, a]} if space else {"angle": a} for name, a in zip(bodies, angles, strict=False)}
+    return Scene.parse({
+        "name": "driven", "dimensions": dimensions, "gravity": place(0.0, -9.81), "bodies": bodies, "joints": joints,
+        "initial": start, "markers": {name: {"body": name, "point": "end"} for name in bodies},
+        "solver": {"duration": 0.1},
+    })  # fmt: skip
+
+
+@pytest.mark.parametrize("closing", [None, 0.0, 1.5])
+@pytest.mark.parametrize("seed", range(3))
+def test_rates_that_a_drive_leaves_open_are_those_of_the_plane(seed: int, closing: float | None) -> None:
+    """Both differ least, in kinetic energy, from bodies that do not turn but as a drive turns them."""
+    machines = (driven_machine(d, np.random.default_rng(seed), closing) for d in (2, 3))
+    plane, space = (simulate(machine, np.array([0.05, 0.1])) for machine in machines)
+    assert plane.ok
+    assert space.ok
+    assert space.points[:, :, :2] == pytest.approx(plane.points, abs=1e-11)

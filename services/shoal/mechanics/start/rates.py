@@ -223,7 +223,8 @@ def _metric(scene: Scene, poses: Array, size: float) -> Array:
         arm = phasor(poses[:, k + 2]) * c
         inertia = 0.0 if isinstance(body, PointMass) else body.inertia
         matrix[:, k, k] = matrix[:, k + 1, k + 1] = body.mass
-        matrix[:, k + 2, k + 2] = inertia + body.mass * (np.abs(arm) ** 2 + (1.0 if point else 1e-6 * size**2))
+        turning = body.mass * size**2 if point else np.maximum(inertia, 1e-6 * body.mass * size**2)
+        matrix[:, k + 2, k + 2] = turning + body.mass * np.abs(arm) ** 2
         matrix[:, k, k + 2] = matrix[:, k + 2, k] = -body.mass * np.imag(arm)
         matrix[:, k + 1, k + 2] = matrix[:, k + 2, k + 1] = body.mass * np.real(arm)
     return matrix

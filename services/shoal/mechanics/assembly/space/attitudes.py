@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,8 @@ from shoal.mechanics import rotation as turns
 from shoal.mechanics.affine import fixed
 from shoal.mechanics.assembly.groups import Orientations, is_stiff, product, transposed
 from shoal.mechanics.elements.unstrained import unstrained
-from shoal.mechanics.joints import Turned
+from shoal.mechanics.fitting import start_slope
+from shoal.mechanics.joints import Hinged, Turned
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.plane import vector
 from shoal.scene import GROUND, Attachment, Rod, Scene
@@ -56,13 +58,41 @@ class Attitudes:
         return product(self._begin[reference], product(transposed(self.kept.root(reference)[1]), relative))
 
     def spin(self, body: str) -> Array:
-        """The angular velocity of a body along the axes of the ground."""
+        """Return the angular velocity of a body along the axes of the ground: stated, as it is driven, or none.
+
+        As in the plane, a body that a drive turns relative to a neighbour turns with it.
+        """
         root = self.kept.root(body)[0]
         if root != GROUND:
             for member in (body, *self._members.get(root, ())):
                 if (stated := self.stated_spin(member)) is not None:
                     return stated
-        return np.zeros((3, 1))
+        return self._driven[root]
+
+    @cached_property
+    def _driven(self) -> dict[str, Array]:
+        """Return spins of groups of locked bodies: stated, that of a neighbour plus the rate of a drive, or none."""
+        found = {GROUND: np.zeros((3, 1))}
+        roots = list(dict.fromkeys(self.kept.root(body)[0] for body in self._scene.bodies))
+        for root in roots:
+            spins = map(self.stated_spin, self._members.get(root, ()))
+            if root != GROUND and (stated := next((one for one in spins if one is not None), None)) is not None:
+                found[root] = stated
+        drives = [tie for _, tie in joints.of_scene(self._scene) if isinstance(tie, Hinged)]
+        waiting = [root for root in roots if root not in found]
+        while waiting:
+            root, spin = next(self._turned(drives, found), (waiting[0], found[GROUND]))
+            found[root] = spin
+            waiting.remove(root)
+        return found
+
+    def _turned(self, drives: list[Hinged], found: dict[str, Array]) -> Iterator[tuple[str, Array]]:
+        """Yield what a drive turns relative to one of those found, with its spin."""
+        for drive in drives:
+            first, second = (self.kept.root(side.body)[0] for side in (drive.first, drive.second))
+            if (first in found) != (second in found):
+                here, there, sign = (first, second, 1.0) if first in found else (second, first, -1.0)
+                yield there, found[here] + sign * start_slope(drive.angle) * turns.unit(vector(*drive.axis))
 
     def image(self, body: str, axis: Any) -> Array:
         """The unit vector in a body's frame of an axis that points so at the start; None: its x axis."""
