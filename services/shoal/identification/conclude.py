@@ -47,11 +47,6 @@ class Wishes:
 
 NOTHING = Wishes()
 
-_OF_FIRST = kinds.FIRST_MODE.found("the draws are about the first of them alone")
-
-
-NOTHING = Wishes()
-
 
 def conclude(
     model: ForwardModel,
