@@ -171,6 +171,8 @@ def _repeated(model: Model, which: list[int]) -> Model:
 
     start, left, right, factor = again(c.start, c.left, c.right, c.factor)
     entry, column = again(c.entry, c.column)
+    turned, rising, share = again(c.turned, c.rising, c.share)
+    by_constraint = ("constant", "lengths", "open", "drive", "way", "period")
     parts = [
         (entry[n] + target - c.entry[k], source, coefficient)
         for n, k in enumerate(order)
@@ -185,8 +187,10 @@ def _repeated(model: Model, which: list[int]) -> Model:
             left=left,
             right=right,
             factor=factor,
-            constant=c.constant[order],
-            drive=c.drive[order],
+            **{name: getattr(c, name)[order] for name in by_constraint},
+            turned=turned,
+            rising=rising,
+            share=share,
             entry=entry,
             column=column,
             parts=len(parts),
