@@ -183,8 +183,8 @@ def uncertain(asked: Uncertain) -> Response:
 
     Examples:
         >>> found = shoal.uncertain("single-pendulum", {"initial.OA.angle": (0.1, 0.2)}, at=[0.5])
-        >>> found.status
-        'ok'
+        >>> print(found.status)
+        ok
     """
     from shoal.response import uncertain
 

@@ -18,7 +18,8 @@ from shoal.engines.capabilities import of_kind
 from shoal.engines.casadi.bodies import PlacedBody, PlacedCable, PlacedRigid, cable_place, turned
 from shoal.engines.casadi.element import cable_element
 from shoal.engines.poses import hanging
-from shoal.scene import GROUND, PointMass, RigidBody, Rod, Scene
+from shoal.errors import InputError
+from shoal.scene import GROUND, PointMass, Revolute, RigidBody, Rod, Scene
 from shoal.scene.record import Vector
 
 
@@ -54,7 +55,9 @@ def build_tree(scene: Scene) -> PlacedTree:
     angles = {name: ca.SX.sym(f"{name}_start") for name in scene.bodies}
     coordinates: list[Any] = []
     start: list[Any] = []
-    for _, parent, child in hanging(scene, "casadi"):
+    for joint, parent, child in hanging(scene, "casadi"):
+        if not isinstance(scene.joints[joint], Revolute):
+            raise InputError(f"joints.{joint}: engine casadi cannot do {scene.joints[joint].kind}")
         outer, inner, name = scene.location(parent), scene.location(child), child.body
         body, angle = scene.bodies[name], angles[name]
         straight[name] = rest = PlacedRigid(straight[parent.body].point(outer) - turned(angle, inner), angle)
