@@ -34,9 +34,20 @@ settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "repeatable"))
 
 
+@pytest.hookimpl(tryfirst=True)  # before `slow` deselects
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """What waits for servers, minutes long, begins first, so that the others are done beside it."""
-    items.sort(key=lambda item: item.path.name != "test_up.py")
+    """Leave most cases of costly tests to the night; begin with what takes minutes, so that others run beside it."""
+    cases: dict[tuple[Any, str], list[pytest.Item]] = {}
+    for item in items:
+        if item.get_closest_marker("by_day") and not item.get_closest_marker("slow"):
+            cases.setdefault((item.path, getattr(item, "originalname", item.name)), []).append(item)
+    for several in cases.values():
+        (count,) = several[0].get_closest_marker("by_day").args
+        by_day = set(np.linspace(0, len(several) - 1, count).round().astype(int).tolist())
+        for number, item in enumerate(several):
+            if number not in by_day:
+                item.add_marker(pytest.mark.slow)
+    items.sort(key=lambda item: (item.path.name != "test_up.py", "pictures" not in item.path.parts))
 
 
 TOGETHER = {

@@ -205,6 +205,7 @@ AT_REST: dict[str, Callable[[Answers], float]] = {
 
 
 @pytest.mark.parametrize("way", WAYS)
+@pytest.mark.by_day(4)
 def test_every_way_out_of_a_motion_states_the_mesh_error(answers: Answers, way: str) -> None:
     """The time error is 2e-5 m: a way out that takes it is a thousand times too good."""
     assert OFF <= WAYS[way](answers) <= 2.5 * OFF
@@ -326,6 +327,7 @@ def places(scene: Scene, starts: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
 
 
 @pytest.mark.parametrize("seed", [*range(4), *(pytest.param(one, marks=pytest.mark.slow) for one in range(4, 12))])
+@pytest.mark.by_day(2)
 def test_no_limit_is_called_kept_that_the_true_machine_passes(seed: int) -> None:
     """Thick rods taken for slender ones, with limits near what the true rod reaches."""
     rng = np.random.default_rng(seed)
@@ -353,6 +355,7 @@ def test_no_limit_is_called_kept_that_the_true_machine_passes(seed: int) -> None
 
 @pytest.mark.parametrize("way", ["monte-carlo", "subset"])
 @pytest.mark.parametrize("seed", [0, 1, *(pytest.param(one, marks=pytest.mark.slow) for one in range(2, 5))])
+@pytest.mark.by_day(2)
 def test_probabilities_of_every_way_are_as_wide_as_the_neglected_inertia_makes_them(way: str, seed: int) -> None:
     """Of thick rods taken for slender ones: the interval holds the probability of the true rod, by scipy.
 

@@ -73,6 +73,7 @@ def test_a_table_begins_with_the_motion_and_drives_without_a_hold(seed: int, suf
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("samples", [8, 40])
+@pytest.mark.by_day(2)
 def test_a_table_as_a_recording_gives_its_machine_back(seed: int, samples: int, tmp_path: Path) -> None:
     """Of 8 samples the first after the start is so late that a recording without t = 0 would begin there."""
     table, _, inertia = simulated(tmp_path, seed, samples)

@@ -120,6 +120,7 @@ def lines(text: str) -> int:
 
 
 @pytest.mark.parametrize("what", [*TABLES, *PROSE])
+@pytest.mark.by_day(3)
 def test_table_fits_a_terminal_and_a_log_file(what: str, monkeypatch: pytest.MonkeyPatch) -> None:
     draw = (TABLES | PROSE)[what]
     text = re.sub(r"\x1b\[[0-9;]*m", "", printed(draw, monkeypatch, WIDTH))
@@ -130,6 +131,7 @@ def test_table_fits_a_terminal_and_a_log_file(what: str, monkeypatch: pytest.Mon
 
 
 @pytest.mark.parametrize("what", TABLES)
+@pytest.mark.by_day(3)
 def test_no_row_is_folded(what: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """A table has as many lines below its headings as with more room."""
     few, many = (lines(printed(TABLES[what], monkeypatch, width)) for width in (WIDTH, 200))
@@ -138,6 +140,7 @@ def test_no_row_is_folded(what: str, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("what", TABLES)
+@pytest.mark.by_day(3)
 def test_no_number_is_broken_on_a_narrow_terminal(what: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """What has no room beside each other stands below each other: no number of the wide table is broken."""
     wide, narrow = (printed(TABLES[what], monkeypatch, width, log=True) for width in (200, 40))

@@ -109,6 +109,7 @@ def test_every_operation_is_a_method_with_the_signature_of_its_function() -> Non
 
 
 @pytest.mark.parametrize("name", CALLS)
+@pytest.mark.by_day(2)
 def test_the_answer_is_the_librarys(client: Client, name: str) -> None:
     arguments, options = CALLS[name]
     far, near = (getattr(place, name)(*arguments, **options) for place in (client, shoal))
@@ -120,6 +121,7 @@ def test_the_answer_is_the_librarys(client: Client, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["select", "sweep", "statics", "modes", "reactions"])
+@pytest.mark.by_day(2)
 def test_without_the_client_it_is_what_the_command_prints(gauss: httpx.Client, name: str) -> None:
     arguments, options = CALLS[name]
     asked = {**signature(getattr(shoal, name)).bind(*arguments, **options).arguments}

@@ -56,6 +56,7 @@ def _pairs() -> tuple[Any, Any]:
 
 
 @LENGTHS
+@pytest.mark.by_day(2)
 def test_operations_equal_those_of_numbers(lanes: tuple[int, ...]) -> None:
     x, y = _pairs()
     found, expected = np.full((11, x.size), 7.0), np.empty((11, x.size))
@@ -117,6 +118,7 @@ def _arcs(lanes, x, out, count):  # type: ignore[no-untyped-def]
 
 
 @LENGTHS
+@pytest.mark.by_day(2)
 def test_arcs_sines_and_cosines_are_those_of_numpy(lanes: tuple[int, ...]) -> None:
     x = np.concatenate([np.linspace(-np.pi / 2, np.pi / 2, 1022), [0.0, 1e-200]])
     out = np.empty((3, x.size))

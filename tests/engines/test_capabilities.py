@@ -40,6 +40,7 @@ def taken(engine: str, machine: Scene) -> bool:
 
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("engine", list(CAPABILITIES))
+@pytest.mark.by_day(45)
 def test_every_engine_does_what_it_says_and_refuses_the_rest(
     engine: str, name: str, scenes: list[Scene], run: Callable[..., Any]
 ) -> None:

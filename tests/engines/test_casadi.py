@@ -88,6 +88,7 @@ def test_element_energy_of_a_stretched_straight_element() -> None:
         ("flexible-double-pendulum-hanging", "full", (1.5846621373, -2.4658202511)),
     ],
 )
+@pytest.mark.by_day(1)
 def test_flexible_double_pendulum(name: str, quadrature: str, expected: tuple[float, float]) -> None:
     run = ENGINE.simulate(_flexible(name, quadrature=quadrature))
     assert run.ok, run.message

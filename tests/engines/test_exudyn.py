@@ -88,6 +88,7 @@ def test_single_pendulum_follows_the_elliptic_closed_form():
 
 @pytest.mark.parametrize("integrator", ["trapezoidal", "generalized-alpha"])
 @pytest.mark.parametrize("friction", [0.0, 0.5])
+@pytest.mark.by_day(2)
 def test_rigid_double_pendulum_follows_the_textbook_equations(integrator, friction):
     lengths, masses = np.array([1.0, 2.0]), np.array([1.0, 2.0])
 
@@ -125,6 +126,7 @@ def test_rigid_double_pendulum_follows_the_textbook_equations(integrator, fricti
         ("flexible-double-pendulum", 2, "reduced", (2.654121, 0.562119), 4e-6),
     ],
 )
+@pytest.mark.by_day(2)
 def test_cable_reaches_the_known_tip(name, first, quadrature, expected, tolerance):
     scene = meshed(name, first, bodies_OA_quadrature=quadrature, bodies_AB_quadrature=quadrature, solver_step=1e-4)
     np.testing.assert_allclose(tip(FAST, scene), expected, atol=tolerance)
@@ -365,6 +367,7 @@ def test_thinned_record_is_read_between_its_kept_steps() -> None:
     ],
 )
 @pytest.mark.parametrize("integrator", ["auto", "generalized-alpha"])
+@pytest.mark.by_day(2)
 def test_no_pulse_is_lost(scale, expected, integrator):
     scene = Scene.parse(
         {

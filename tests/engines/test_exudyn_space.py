@@ -73,6 +73,7 @@ KINDS: dict[str, list[dict[str, Any]]] = {
 
 
 @pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.by_day(2)
 def test_every_joint_moves_as_in_the_native_solver(kind: str) -> None:
     far, near = gaps(chain(*KINDS[kind]), np.array([0.1, 0.2]), 2e-3)
     assert near < 1e-5
@@ -94,6 +95,7 @@ LOADS: dict[str, dict[str, Any]] = {
 
 
 @pytest.mark.parametrize("load", LOADS)
+@pytest.mark.by_day(2)
 def test_every_load_acts_as_in_the_native_solver(load: str) -> None:
     """Linked by revolute joints; the torsion spring is stiff, and its error at this step is what it is."""
     machine = chain({"axis": AXIS}, {"axis": OTHER}, loads=LOADS[load])

@@ -22,6 +22,7 @@ Cases = dict[str, Any]
 Run = Callable[..., Array]
 
 
+@pytest.mark.by_day(3)
 def test_native_solver_agrees_with_exudyn(exudyn_case: Any, run: Run, native: Run) -> None:
     pytest.importorskip("exudyn")
     case, ours = exudyn_case, native(exudyn_case)
@@ -40,6 +41,7 @@ def test_native_solver_agrees_with_casadi(casadi_case: Any, run: Run, native: Ru
 @pytest.mark.parametrize(
     "name", ["clamped-tip-mass", pytest.param("distributed", marks=pytest.mark.slow), "torque-on-cable", "two-cables"]
 )
+@pytest.mark.by_day(1)
 def test_beams_come_near_the_cables(name: str, cases: Cases, run: Run) -> None:
     """Shear and rotary inertia are left out of a cable: EI / (kGA L^2) is 1e-4 here."""
     pytest.importorskip("exudyn")
@@ -70,6 +72,7 @@ def test_a_start_that_a_joint_forbids_is_bad_input(
 
 
 @pytest.mark.parametrize("name", ["torsion", "damped-cable", "slider-friction", "force-in-time", "elastic-table"])
+@pytest.mark.by_day(2)
 def test_exudyns_energy_balance_counts_springs_friction_and_loads(name: str, cases: Cases) -> None:
     """The trapezoidal rule leaves an error of order two in the balance, and nothing else."""
     pytest.importorskip("exudyn")

@@ -126,6 +126,7 @@ def distances(scene: Scene, folder: Path) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize("kind", JOINTS)
+@pytest.mark.by_day(3)
 def test_every_joint_moves_as_in_the_native_solver_there_and_back(kind: str, tmp_path: Path) -> None:
     theirs, back = distances(machine(JOINTS[kind]), tmp_path)
     assert theirs < 1e-8
@@ -162,6 +163,7 @@ RIGID = [name for name in scene_names() if name not in FLEXIBLE]
 @pytest.mark.parametrize(
     "name", [name if name in FAST else pytest.param(name, marks=pytest.mark.slow) for name in RIGID]
 )
+@pytest.mark.by_day(2)
 def test_built_in_scenes(name: str, tmp_path: Path) -> None:
     theirs, back = distances(load_scene(name), tmp_path)
     assert theirs < SOFT.get(name, 2e-5)

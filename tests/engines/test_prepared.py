@@ -52,6 +52,7 @@ def repeated(scene: shoal.Scene, **asked: Any) -> Trajectory:
     "name",
     [pytest.param(name, marks=[pytest.mark.slow] * (name in LONG_TO_COMPILE)) for name in scene_names()],
 )
+@pytest.mark.by_day(3)
 def test_every_scene_repeats_itself(name: str) -> None:
     scene = load_scene(name)
     times = scene.solver.step * np.array([1.0, 7.5, 10.0])

@@ -142,6 +142,7 @@ def mesh_matters(scene: Scene, scale: float) -> bool:
 
 
 @pytest.mark.parametrize("seed", range(FEW))
+@pytest.mark.slow
 def test_the_verdict_on_a_few_machines_is_right(seed: int) -> None:
     assert fault(seed) == ""
 

@@ -52,6 +52,7 @@ LONG = {"governor"}
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=pytest.mark.slow) if name in LONG else name for name in EXACT]
 )
+@pytest.mark.by_day(3)
 def test_estimated_error_covers_the_true_one(name: str) -> None:
     """References: closed forms, scipy, Exudyn (see the problem library)."""
     problem = get_problem(name)

@@ -20,7 +20,7 @@ STAMPS = {
     shoal_flows: {"tracking/record.py": 1, "report/morning.py": 1},
     shoal: {"api/access.py": 1, "api/connection.py": 1, "doctor.py": 1},
 }
-"""When an entry of MLflow or a morning page was made; when a request came, or was refused; when the next night comes."""
+"""When an entry of MLflow or a morning page was made; when a request came or was refused; when the next night comes."""
 WALL = {("time", "time"), ("time", "time_ns"), ("datetime", "now"), ("datetime", "utcnow"), ("date", "today")}
 
 

@@ -393,6 +393,7 @@ PASSED: list[tuple[str, dict[str, str], set[str]]] = [
         for passed in PASSED
     ],
 )
+@pytest.mark.by_day(2)
 def test_unusual_machines_pass_through_every_flow(
     scene: Callable[[], str],
     axes: str,

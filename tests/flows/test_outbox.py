@@ -96,6 +96,7 @@ def test_an_upload_that_breaks_off_sends_nothing_twice(monkeypatch: pytest.Monke
 
 @pytest.mark.usefixtures("silent")
 @pytest.mark.parametrize("end", [None, ValueError("no"), KeyboardInterrupt()])
+@pytest.mark.by_day(1)
 def test_whatever_the_end_of_a_study_what_waits_goes_along(
     end: BaseException | None, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

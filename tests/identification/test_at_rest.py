@@ -28,6 +28,7 @@ def hanging() -> tuple[Problem, Array]:
 
 
 @pytest.mark.parametrize("offset", [0.0, 1e-9, 1e-3])
+@pytest.mark.by_day(1)
 def test_a_noise_free_recording_at_rest(offset: float) -> None:
     """A residual that is infinitely many times a noise of zero has chance zero; the square raised OverflowError."""
     problem, points = hanging()

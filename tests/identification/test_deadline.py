@@ -194,6 +194,7 @@ def ends_clearly(case: str, looks: int, grace: int, folder: Path) -> None:
 
 
 @pytest.mark.parametrize("case", [case for case in CASES if case != "exchanged"])
+@pytest.mark.by_day(2)
 def test_at_whatever_look_the_time_ends_the_answer_has_a_status(
     case: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

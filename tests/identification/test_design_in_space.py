@@ -136,6 +136,7 @@ def test_sensors_tell_what_the_fisher_matrix_of_eulers_equations_says(spun: Desi
     assert told == {*on_the_body, ("tip", "position"), ("tip", "rate"), ("O", "force")}
 
 
+@pytest.mark.slow
 def test_an_accelerometer_of_one_axis_is_turned_to_where_it_tells_most(spun: Design) -> None:
     (found,) = [std for sensor, std in spun.ranked if (sensor.name, sensor.quantity) == ("top-start", "one-axis")]
     tried = [along for along in np.ndindex(3, 3, 3) if 0 < np.abs(np.array(along) - 1).sum() < 3]

@@ -61,6 +61,7 @@ TIMES = np.linspace(0.0, 3.0, 121)[1:]
 
 
 @pytest.mark.parametrize("bound", [1.0, 100.0, 500.0])
+@pytest.mark.by_day(1)
 def test_two_centres_of_mass_swing_alike_in_any_bounds(bound: float, tmp_path: Path) -> None:
     """Huygens: a pendulum swings alike about the conjugate pivot, at I/(m c)."""
     sought = {

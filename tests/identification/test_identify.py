@@ -33,6 +33,7 @@ def test_least_squares_on_casadi_data_of_the_same_mesh_is_exact(name: str) -> No
 
 
 @pytest.mark.parametrize("name", ["paper-case-1", "paper-case-2"])
+@pytest.mark.by_day(1)
 def test_data_from_exudyns_fine_mesh_lie_within_the_intervals(name: str) -> None:
     estimate = run(name, "least-squares")
     assert estimate.verdict is Verdict.IDENTIFIED

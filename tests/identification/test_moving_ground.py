@@ -12,6 +12,7 @@ from shoal.identification import Problem
 
 
 @pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.by_day(1)
 def test_an_accelerometer_beside_a_spring_to_a_moving_point(seed: int, tmp_path: Path) -> None:
     rng = np.random.default_rng(seed)
     mass, k, b, w = rng.uniform(1, 4), rng.uniform(50, 200), rng.uniform(1, 5), rng.uniform(3, 9)

@@ -155,6 +155,7 @@ HIP = {"first": {"body": "post", "point": "hip"}, "second": {"body": "arm"}}
     ],
     ids=lambda joint: "-".join(str(joint[part]) for part in ("kind", "rotation") if part in joint),
 )
+@pytest.mark.by_day(2)
 def test_load_cells_along_a_motion_show_the_reactions_at_its_instants(joint: dict[str, Any]) -> None:
     """The wrenches of all samples at once against work per displacement, one state after the other."""
     scene = arm(

@@ -88,6 +88,7 @@ def test_channels_count_by_the_noise_that_they_show() -> None:
 
 
 @pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.by_day(1)
 def test_what_one_sensor_contradicts_is_seen(seed: int) -> None:
     """Gravity two degrees off against the camera, by ten times its noise: trusted before, with a wrong angle."""
     found = identified(CAMERA_AND_IMU, seed, tilt=np.radians(2.0))

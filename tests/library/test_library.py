@@ -263,6 +263,7 @@ def hostile() -> dict[str, tuple[str, dict[str, bytes]]]:
     return found | {f"table-{name}": ("recordings", {"a.yaml": described, "a.csv": b}) for name, b in bombs.items()}
 
 
+@pytest.mark.slow
 def test_two_hundred_entries_with_hostile_ones_among_them(folder: Path) -> None:
     """Each of these is refused in less than a second of processor time, and nothing of it stays."""
     good = [library.add(folder / "machine.yaml", f"machine-{k}") for k in range(100)]

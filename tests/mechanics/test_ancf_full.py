@@ -211,6 +211,7 @@ def test_the_work_of_the_mean_force_is_the_loss_of_energy(law: str, seed: int) -
 
 
 @laws
+@pytest.mark.by_day(2)
 def test_lanes_equal_singles(law: str) -> None:
     width = len(WIDE)
     states = np.array([_bent(seed) for seed in range(width)]).T
@@ -348,6 +349,7 @@ COWPER = 10 * (1 + POISSON) / (12 + 11 * POISSON)
 
 
 @laws
+@pytest.mark.by_day(2)
 def test_a_cantilever_converges_to_the_director_rod_of_its_law(law: str) -> None:
     shape, exact = _director_rod(law, COWPER)
     # Two Gauss points need r_x held at one node, which costs the second order there.

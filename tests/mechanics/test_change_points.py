@@ -144,6 +144,7 @@ def _offset(seed: int) -> float:
 
 
 @pytest.mark.parametrize("offset", [0.0, 1e-12, -1e-12, 1e-11, -1e-11, 4e-8])
+@pytest.mark.by_day(2)
 def test_a_linkage_near_a_change_point_stays_on_its_branch(offset: float) -> None:
     """The wrong branch was taken below a part of 1e-10, 0.3 m off, status ok, with 1e-5 m told."""
     for seed in (2, 5):

@@ -62,6 +62,7 @@ def off_branch(run: Any, pins: Any) -> float:
 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("count", [2, 3, 4])
+@pytest.mark.by_day(2)
 def test_a_drive_that_moves_at_once_starts_on_a_branch(count: int, seed: int) -> None:
     """Rates were met by the nearest change: of no branch, on to which the motion snapped after milliseconds."""
     rate = np.random.default_rng(seed).uniform(0.2, 2.0)
@@ -76,6 +77,7 @@ def test_a_drive_that_moves_at_once_starts_on_a_branch(count: int, seed: int) ->
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("count", [2, 3, 4])
 @pytest.mark.parametrize("drive", ["0.4*(1-cos(2*t))", "1.5*t**2", "0.3*t**3", "0.5*t**5", "max(0,t-0.05)**2"])
+@pytest.mark.by_day(7)
 def test_a_drive_that_sets_out_from_rest_leaves_on_a_branch(count: int, seed: int, drive: str) -> None:
     """Its first derivatives by time vanish there: the motion left on no branch, or crept beside it to its last step."""
     scene, pins = draw(seed, count, drive, {})

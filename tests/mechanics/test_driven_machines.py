@@ -122,6 +122,7 @@ def test_the_estimated_error_of_an_open_chain_is_that_of_its_tolerance(tolerance
 
 @pytest.mark.parametrize("dimensions", [2, 3])
 @pytest.mark.parametrize("unit", [1.0, 1e-2, 1e-4, 1e-6])
+@pytest.mark.by_day(2)
 def test_a_drive_may_be_as_fast_as_it_likes(unit: float, dimensions: int) -> None:
     """What it asks of the start is its derivative there, and no difference over a tenth of a millisecond."""
     rate = 20.0 / unit

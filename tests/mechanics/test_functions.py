@@ -136,6 +136,7 @@ def test_antiderivative() -> None:
 
 
 @pytest.mark.parametrize("power", [1 / 3, 0.5, 0.2, 0.1, 0.05, 2 / 3, 0.9])
+@pytest.mark.by_day(2)
 def test_roots_of_a_kink_are_fitted(power: float) -> None:
     rng = np.random.default_rng(int(1000 * power))
     place, begin, factor = rng.uniform(0.1, 0.9), rng.uniform(-1.0, 1.0), rng.uniform(0.5, 3.0)

@@ -212,6 +212,7 @@ def test_the_energy_error_of_leapfrog_does_not_grow() -> None:
 
 
 @every
+@pytest.mark.by_day(2)
 def test_the_motion_inside_a_step_is_as_accurate_as_at_its_ends(integrator: str, truth: Any) -> None:
     known = facts(integrator)
     step = None if known.adaptive else 4e-3
@@ -328,6 +329,7 @@ def test_generalized_alpha_is_of_second_order_at_any_spectral_radius(radius: flo
 )
 @pytest.mark.parametrize("lanes", [2, 19])
 @every_in_lanes
+@pytest.mark.by_day(8)
 def test_lanes_equal_singles(integrator: str, scene: Scene, values: dict[str, Any], lanes: int) -> None:
     # 2 lanes fill a tile by repetition, 19 need a second tile.
     ranges = {path: np.linspace(*span, lanes) for path, span in values.items() if span}

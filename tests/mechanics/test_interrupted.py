@@ -66,6 +66,7 @@ def ended(script: str) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.parametrize("how", [MAIN, TILES, THREAD], ids=["main", "tiles", "thread"])
+@pytest.mark.by_day(1)
 def test_a_run_is_interrupted(how: str) -> None:
     """One compiled call held the main thread until its end, and threads of tiles were waited for."""
     process = ended(SCENE + how)

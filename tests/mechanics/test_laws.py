@@ -39,6 +39,7 @@ def sled(law: str, start: float, duration: float) -> Scene:
         ("2*t + 0.5*sin(8*t)", lambda x: 2 * x + 0.5 * np.sin(8 * x), 120.0, 4.0),
     ],
 )
+@pytest.mark.by_day(2)
 def test_a_mass_moves_by_the_law_as_it_is_written(
     law: str, force: Callable[[float], float], start: float, duration: float
 ) -> None:
@@ -61,6 +62,7 @@ def test_where_a_law_is_not_known_a_run_ends_and_says_so(law: str) -> None:
 
 
 @pytest.mark.parametrize("law", ["t**3", "exp(t) - 1", "max(t, 0)**1.5", "t - 0.3", "5 + t", "-2*tanh(5*t)"])
+@pytest.mark.by_day(2)
 def test_energy_is_the_integral_of_the_force_at_every_size(law: str) -> None:
     """By Gauss and Legendre on the law itself, from zero to elongations of all decades."""
     known, (nodes, weights) = antiderivative(fit_law(Function.model_validate(law))), np.polynomial.legendre.leggauss(30)

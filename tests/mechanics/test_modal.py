@@ -115,6 +115,7 @@ def _ends(scene: Scene) -> Array:
 
 
 @pytest.mark.parametrize("seed", range(3))
+@pytest.mark.by_day(1)
 def test_chains_move_as_lagrange_says(seed: int) -> None:
     scene, *chain = _chain(seed)
     assert np.max(np.abs(_ends(scene) - judge.motion(*chain, TIMES, 9.81))) < 1e-8

@@ -258,6 +258,7 @@ def _mixed(name: str, friction: float) -> Scene:
 
 @pytest.mark.parametrize("friction", [0.0, 0.01])
 @pytest.mark.parametrize("name", ["rod", "cable", "branched"])
+@pytest.mark.by_day(2)
 def test_mixed_trees_against_casadi(name: str, friction: float) -> None:
     """A rod that carries a cable, a cable that carries a body, and both with branches."""
     scene = _mixed(name, friction)

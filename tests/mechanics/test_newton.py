@@ -44,6 +44,7 @@ def _missed(path: Any) -> Any:
     return missed
 
 
+@pytest.mark.slow
 def test_a_cubic_path_is_guessed_once_it_is_seen() -> None:
     t = 0.1 * np.arange(9)[:, None]
     missed = _missed(1.0 + t - 2.0 * t**2 + 3.0 * t**3 * np.arange(1, 9))

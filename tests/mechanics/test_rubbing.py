@@ -68,6 +68,7 @@ def pendulum(mu: float, radius: float, body: dict[str, Any] = ROD, **more: Any) 
 
 
 @pytest.mark.parametrize(("body", "arm", "inertia"), [(ROD, 0.5, 2.0 / 3.0), (BOB, 1.0, 2.0)])
+@pytest.mark.by_day(1)
 def test_a_pendulum_loses_what_its_pin_bears_times_the_way_it_slides(
     body: dict[str, Any], arm: float, inertia: float
 ) -> None:
@@ -104,6 +105,7 @@ def test_the_reaction_has_the_friction_that_its_own_force_makes() -> None:
     assert abs(joint.torque) == pytest.approx(0.3 * 0.05 * np.linalg.norm(joint.force), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_two_dry_pins_brake_a_double_pendulum_as_newton_and_euler_say() -> None:
     """All forces of both pins as unknowns, beside the accelerations; integrated by scipy."""
     lengths, masses, mu, radius, speed = (1.0, 0.7), (2.0, 1.4), (0.2, 0.3), (0.05, 0.03), 0.05

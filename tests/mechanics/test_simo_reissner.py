@@ -159,6 +159,7 @@ def test_frequencies_are_timoshenkos_with_the_fourth_order() -> None:
     assert np.all(np.log2(np.array(errors[0]) / np.array(errors[1])) > 3.5)
 
 
+@pytest.mark.slow
 def test_kelvin_voigt_damps_a_mode_by_half_its_angular_frequency_times_the_retardation() -> None:
     for mode in modes(cantilever(4, retardation=1e-6), count=3).modes:
         assert mode.damping_ratio == pytest.approx(0.5e-6 * mode.angular_frequency, rel=1e-6)

@@ -28,6 +28,7 @@ def _at(scene: Scene, marker: str, end: float) -> Any:
 @pytest.mark.parametrize(
     ("loops", "end", "tolerance"), [(1, 10.0, 1e-9), (2, 10.0, 1e-9), (5, 20.0, 1e-8), (40, 20.0, 1e-8)]
 )
+@pytest.mark.by_day(2)
 def test_n_four_bar_turns_through_its_singular_positions(loops: int, end: float, tolerance: float) -> None:
     scene = load_scene(f"n-four-bar-{loops}")
     np.testing.assert_allclose(_at(scene, "B0", end), _end(one_angle.four_bar(loops), end), atol=tolerance)

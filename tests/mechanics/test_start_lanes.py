@@ -48,6 +48,7 @@ def four_bar(lengths: list[float], base: float, **angles: float) -> Scene:
     )
 
 
+@pytest.mark.slow
 def test_guesses_side_by_side_find_what_one_after_the_other_finds() -> None:
     random, later, none = np.random.default_rng(8), 0, 0
     for _ in range(60):

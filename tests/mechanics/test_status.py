@@ -99,6 +99,7 @@ def test_a_motion_that_is_not_finite_has_diverged(integrator: str) -> None:
 
 @pytest.mark.parametrize("rate", [1e3, 1e4, 1e6])
 @every
+@pytest.mark.by_day(4)
 def test_violent_motion_never_passes_as_ok(integrator: str, rate: float) -> None:
     # Just under the limit of the state at rest: the stretched cables are stiffer, the step is too long for them.
     scene = _with(FLEXIBLE, integrator=integrator, step=6.5e-4).with_values({"initial.AB.rate": rate})

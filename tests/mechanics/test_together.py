@@ -21,6 +21,7 @@ LANES = 11
         pytest.param("bricard", marks=pytest.mark.slow),
     ],
 )
+@pytest.mark.by_day(2)
 def test_lanes_move_as_they_would_alone(name: str) -> None:
     """With steps of their own, which lanes share otherwise; Bricard's mechanism has a condition too many."""
     scene = load_scene(name)

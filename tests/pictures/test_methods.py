@@ -28,6 +28,7 @@ Estimates = Mapping[str, Estimate]
 
 
 @pytest.mark.parametrize("draw", [convergence, remainders, mesh_error])
+@pytest.mark.by_day(1)
 def test_figure_is_drawn_without_warnings_and_labelled(
     draw: Callable[[Estimates, str], Figure], estimates: Estimates
 ) -> None:

@@ -23,6 +23,7 @@ from shoal.scene import load_scene
         pytest.param("swinging-strip", marks=pytest.mark.slow),
     ],
 )
+@pytest.mark.by_day(2)
 def test_two_frames_are_the_start_and_the_equilibrium(name: str) -> None:
     """The first is that of the time loop, the second has its markers where statics finds them."""
     scene = load_scene(name)

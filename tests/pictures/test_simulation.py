@@ -33,6 +33,7 @@ COMPILES = "flyball-governor"
     "name",
     [*(pytest.param(name, marks=[pytest.mark.slow] * (name == COMPILES)) for name in scene_names()), "n-four-bar-2"],
 )
+@pytest.mark.by_day(3)
 def test_every_scene_moves(name: str) -> None:
     """Outlines of every body, finite, of the size of the machine, standing on its ground."""
     scene = load_scene(name)

@@ -124,6 +124,7 @@ DISTRIBUTIONS = (stats.norm(0.0, 1.0), stats.uniform(-1.0, 2.0), stats.triang(0.
 
 
 @pytest.mark.parametrize("seed", [*range(2), *(pytest.param(k, marks=pytest.mark.slow) for k in range(2, 20))])
+@pytest.mark.by_day(1)
 def test_random_studies_against_brute_force(seed: int) -> None:
     """Smooth functions of one or two intervals and one or two distributions: a grid over the intervals, and quantiles
     of scipy at many quasi-random points for each of its points.
@@ -259,6 +260,7 @@ def test_what_cannot_be_asked_is_refused() -> None:
         uncertain(scene, {HEIGHT: (-0.05, 0.1)}, method="nested")
 
 
+@pytest.mark.slow
 def test_the_command_and_its_files(tmp_path: Path) -> None:
     """The same numbers in the table, in JSON, in NetCDF and on the page; a study that is kept gives them again."""
     xr = pytest.importorskip("xarray")

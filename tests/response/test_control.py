@@ -25,6 +25,7 @@ from sliding import puck
     ("place", "share"),
     [(0.31, 0.06), *(pytest.param(*one, marks=pytest.mark.slow) for one in ((-0.72, 0.05), (0.38, 0.12)))],
 )
+@pytest.mark.by_day(2)
 def test_a_band_between_runs_is_not_passed_over(place: float, share: float, count: int, method: str) -> None:
     """A straight line, but for a band of 5 to 12 % of the first interval, where the answer is lower by two."""
     inputs = Inputs(tuple(UncertainParameter(f"p{k}", Interval(-1.0, 1.0), {f"p{k}": 1.0}) for k in range(count)))

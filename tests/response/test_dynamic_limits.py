@@ -52,6 +52,7 @@ def worst(text: str, angle: float) -> float:
         *(pytest.param(*one, marks=pytest.mark.slow) for one in (("O.fy < -0.5", True), ("abs(O.fx) > 4", False))),
     ],
 )
+@pytest.mark.slow
 def test_forces_in_a_joint_with_intervals(text: str, kept: bool) -> None:
     """The least margin is that of the closed form over a dense scan of the angle."""
     found = uncertain(PENDULUM, {START: (-1.2, -1.0)}, TIMES, limit=[text], verify=False)
@@ -94,6 +95,7 @@ def test_a_rare_force_by_importance_sampling() -> None:
 
 
 @pytest.mark.parametrize("way", WAYS)
+@pytest.mark.by_day(2)
 def test_the_probability_of_an_energy_by_every_way(way: str) -> None:
     """The energy is m g L sin(angle) from the start on, at all instants."""
     bound, mean, deviation = -8.3, -1.1, 0.04
@@ -146,6 +148,7 @@ def test_energies_of_a_torsion_spring_that_is_wound_up() -> None:
     assert found.limits[1].margin == pytest.approx(100 - most, abs=1e-5)
 
 
+@pytest.mark.slow
 def test_a_parameter_that_is_a_number_in_a_table() -> None:
     """A push of s along the guide and 2 s across, s the height of a table of one step, in [1, 2].
 

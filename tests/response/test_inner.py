@@ -79,6 +79,7 @@ def judge(answer: ModelResponse, mean: Array, deviation: Array) -> None:
 
 
 @pytest.mark.parametrize("seed", [*range(6), *(pytest.param(k, marks=pytest.mark.slow) for k in range(6, 60))])
+@pytest.mark.by_day(2)
 def test_random_chains(seed: int) -> None:
     """Stiffnesses within intervals move the mean through cycles; masses scatter by 0.01 to 0.5 %."""
     random = np.random.default_rng(seed)

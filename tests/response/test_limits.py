@@ -59,6 +59,7 @@ def test_limits_that_surround_the_mean(state: str) -> None:
     assert np.abs(told.ratios - 1).max() < 0.1
 
 
+@pytest.mark.slow
 def test_more_design_points_than_are_found_are_a_doubt() -> None:
     """Sixteen sides of a cube: some are missed, and what is told is then too low."""
     function, exact = cube(4.0, 8)

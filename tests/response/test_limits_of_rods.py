@@ -122,6 +122,7 @@ def test_the_energy_of_a_machine_that_bends() -> None:
     assert found.limits[0].margin == pytest.approx(100 - energy(0.8), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_the_force_and_the_energy_of_a_pendulum_in_space() -> None:
     """m g cos p + m v^2 / L from the conservation of energy, whatever the plane in which it swings."""
     scene, path, times = load_scene("spherical-pendulum"), "initial.A.velocity.1", [0.2, 0.4]

@@ -45,6 +45,7 @@ def exact(motion: Motion, parameters: int, times: Array) -> tuple[Array, Array]:
 
 
 @pytest.mark.parametrize("method", ["auto", "time-warp", "torus"])
+@pytest.mark.by_day(1)
 def test_a_pendulum_for_a_thousand_seconds(method: str) -> None:
     """Within 1e-7 rad with nine runs, where polynomials at single instants need hundreds."""
     times = np.array([10.0, 100.0, 500.0, 999.0, 1000.0])

@@ -197,6 +197,7 @@ def test_indices_where_polynomials_fail(method: str, count: int | None) -> None:
     ],
     ids=lambda known: type(known).__name__,
 )
+@pytest.mark.by_day(2)
 def test_moments_of_a_square(known: Marginal) -> None:
     """Mean and deviation of x^2 from the moments that the distribution has in closed form or by quadrature."""
     answer = respond(model(lambda v: v["x"][:, None] ** 2), inputs(x=known), 1, method="chaos", degree=6)

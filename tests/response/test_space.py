@@ -67,6 +67,7 @@ def test_z_is_no_limit_in_the_plane() -> None:
 
 
 @pytest.mark.parametrize("suffix", [".html", ".png", ".csv"])
+@pytest.mark.by_day(1)
 def test_pictures_and_tables_show_three_coordinates(tmp_path: Path, suffix: str) -> None:
     file = tmp_path / f"found{suffix}"
     arguments = ["uncertain", "spherical-pendulum", "--vary", f"gravity.2={LOW}:{HIGH}", "--at", "0.5,1", "--json"]

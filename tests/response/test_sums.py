@@ -100,6 +100,7 @@ def test_the_convolution_of_many_variables_by_importance_sampling() -> None:
 
 
 @pytest.mark.parametrize("seed", [0, 1, 17])
+@pytest.mark.by_day(1)
 def test_a_sum_of_heavy_tails(seed: int) -> None:
     of, exact = drawn(seed, 10)
     found = of.asked(seed)

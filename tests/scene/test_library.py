@@ -28,6 +28,7 @@ def test_a_built_in_scene_loads_under_its_own_name(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", scene_names())
+@pytest.mark.by_day(3)
 def test_a_scene_survives_yaml(name: str, tmp_path: Path) -> None:
     scene = load_scene(name)
     text = yaml.safe_dump(scene.model_dump(mode="json"))

@@ -50,6 +50,7 @@ def test_chosen_scene_reproduces_the_run() -> None:
 
 
 @pytest.mark.parametrize(("modulus", "rigid"), [(2e16, True), (2e14, True), (2e7, False)])
+@pytest.mark.by_day(1)
 def test_stiff_rods_come_out_rigid_and_soft_ones_do_not(modulus: float, rigid: bool) -> None:
     selection = select(_with_modulus(modulus), 1e-2)
     assert selection.met
@@ -314,6 +315,7 @@ THICK = HEADLINE.with_values(
 )
 
 
+@pytest.mark.slow
 def test_thick_rods_shear_and_keep_their_word_against_geometrically_exact_beams() -> None:
     """Exudyn's geometrically exact beams have shear; slender rods end beyond the tolerance from them."""
     pytest.importorskip("exudyn")

@@ -163,6 +163,7 @@ def headed(place: float) -> Scene:
 
 
 @pytest.mark.parametrize(("place", "multiple"), [(0.3, 3), (0.45, 2)])
+@pytest.mark.slow
 def test_a_rod_that_is_held_between_its_ends_has_a_node_there(place: float, multiple: int) -> None:
     """A mass on a spring of 3 E I L^3 / (a b)^3, which falls by g / w^2 (1 - cos(w t))."""
     tolerance = 2e-5

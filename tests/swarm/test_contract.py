@@ -141,6 +141,7 @@ def test_wrong_bounds_are_refused(name: str, box: list[tuple[float, float]]) -> 
 
 
 @ALL
+@pytest.mark.by_day(1)
 def test_finds_the_bottom_of_a_bowl(name: str) -> None:
     """Best of the sphere in [-5, 5]^2 after 100 iterations of 40 fish; medians measured: 1.5e-4, 9e-23, 5e-4.
 

@@ -22,6 +22,7 @@ BENT = (11, 14, 24)
 
 
 @pytest.mark.parametrize("seed", [*FEW, *(pytest.param(seed, marks=pytest.mark.slow) for seed in LONG)])
+@pytest.mark.by_day(1)
 def test_a_machine_keeps_its_word_at_a_fair_price(seed: int) -> None:
     case = study(draw(seed), exhaustive=True)
     assert case.met, case.reason

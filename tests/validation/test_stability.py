@@ -68,6 +68,7 @@ def test_a_few_cells_of_every_map_are_chosen() -> None:
 
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name in LONG)) for name in FEW])
+@pytest.mark.by_day(2)
 def test_nothing_of_ours_is_silently_wrong_on_a_few_cells(name: str) -> None:
     result = survey(_few(name))
     assert _silent(result) == []

@@ -26,6 +26,7 @@ def _recursion(tree: Any, q: Any, v: Any) -> Any:
 
 @seeds
 @every
+@pytest.mark.by_day(5)
 def test_recursion_equals_the_dense_equations(random_tree: Any, mixes: Any, mix: str, seed: int) -> None:
     at = random_tree(mixes[mix], seed)
     dense = accelerations(*at)
@@ -34,6 +35,7 @@ def test_recursion_equals_the_dense_equations(random_tree: Any, mixes: Any, mix:
 
 @seeds
 @every
+@pytest.mark.by_day(5)
 def test_accelerations_equal_mujoco(random_tree: Any, mixes: Any, mix: str, seed: int) -> None:
     tree, q, v = random_tree(mixes[mix], seed)
     reference, kinetic, places = _mujoco(tree, q, v)

@@ -82,6 +82,7 @@ def test_intervals_hold_the_friction_where_another_law_leaves_a_misfit(
 
 
 @pytest.mark.parametrize("seed", range(3))
+@pytest.mark.by_day(1)
 def test_a_law_that_would_not_show_is_told_and_widens_nothing(seed: int) -> None:
     """With as much noise the misfit is gone; the number is off by more than its interval, but not by what is told."""
     estimate, right = (identified(law, 3e-3, seed, 0.15) for law in ("dry friction", "none"))

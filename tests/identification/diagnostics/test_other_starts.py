@@ -172,6 +172,7 @@ RATE = {"path": "initial.r.spin.1", "lower": -10.0, "upper": 10.0, "start": 0.0}
 
 
 @pytest.mark.parametrize(("axes", "upper"), [("z", 3.2), ("xz", 3.2), ("z", 1.5)])
+@pytest.mark.by_day(1)
 def test_a_height_tells_no_pendulum_in_space_from_its_mirror_image(axes: str, upper: float, tmp_path: Path) -> None:
     """About y, downwards: the angle 2.5 with the rate -1 is pi - 2.5 with 1 from the other side."""
     times = np.linspace(0.0, 1.5, 61)

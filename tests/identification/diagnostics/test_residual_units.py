@@ -27,6 +27,7 @@ def estimate(channels: list[dict[str, str]]) -> Estimate:
     ("channels", "size"),
     [(TIP, " m (RMS for each channel), "), ([TURN], " rad (RMS for each channel), "), ([*TIP, TURN], "times")],
 )
+@pytest.mark.by_day(1)
 def test_size_of_the_residual_has_a_unit(channels: list[dict[str, str]], size: str) -> None:
     first = estimate(channels).residual_tests.sentences()[0]
     assert size in first

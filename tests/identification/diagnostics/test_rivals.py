@@ -56,6 +56,7 @@ def drawn(rng: np.random.Generator) -> tuple[Problem, bool]:
 
 
 @pytest.mark.parametrize("seed", [*range(6), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(6, 206))])
+@pytest.mark.by_day(2)
 def test_mirror_images_are_ambiguous_where_the_bounds_hold_both(seed: int) -> None:
     rng = np.random.default_rng(seed)
     stated, mirrored = drawn(rng)
@@ -106,6 +107,7 @@ def test_a_curved_valley_is_one_place_and_a_mirror_image_another() -> None:
 
 
 @pytest.mark.parametrize(("centre", "start", "upper"), [(0.35, 0.3, 1.5), (0.8, 1.0, 1.5), (0.35, 0.3, 0.5)])
+@pytest.mark.by_day(1)
 def test_two_centres_of_mass_swing_alike(centre: float, start: float, upper: float, tmp_path: Path) -> None:
     """A pendulum of inertia I about its centre of mass, at a, has the angles of one at I / (m a) (Huygens)."""
     inertia, ends = 0.25, sorted([centre, 0.25 / centre])

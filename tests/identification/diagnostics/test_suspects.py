@@ -67,6 +67,7 @@ def test_every_suspect_of_a_machine_has_a_name_of_its_own() -> None:
     assert len({*names}) == len(names)
 
 
+@pytest.mark.slow
 def test_a_wrong_clock() -> None:
     """The recording shows 1.26 s for each second; gravity explains a free swing as well, by the square of that."""
     named = found(tip(TIMES / 1.26, np.pi / 4, np.pi / 6), TIMES)

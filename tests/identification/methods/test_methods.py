@@ -42,6 +42,7 @@ def error(model: ForwardModel, outcome: Outcome) -> float:
 
 
 @pytest.mark.parametrize("name", marked(METHODS))
+@pytest.mark.by_day(2)
 def test_a_method_is_repeatable_counted_and_right(name: str) -> None:
     """The global random state must not matter, and the best point is one that was evaluated."""
     np.random.seed(0)  # noqa: NPY002 - to show that it is not used
@@ -59,6 +60,7 @@ def test_a_method_is_repeatable_counted_and_right(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", marked(name for name in METHODS if name not in SHOOTING))
+@pytest.mark.by_day(2)
 def test_failed_simulations_stop_no_method(name: str, watched: Callable[..., Any]) -> None:
     """A third of the box cannot be simulated; the search goes on around it."""
     model = made()
@@ -71,6 +73,7 @@ def test_failed_simulations_stop_no_method(name: str, watched: Callable[..., Any
 
 
 @pytest.mark.parametrize("name", marked(GLOBAL))
+@pytest.mark.by_day(2)
 def test_one_parameter_is_enough(name: str) -> None:
     problem = rigid_problem()
     only = {"theta2": problem.parameters["theta2"]}

@@ -140,6 +140,7 @@ FAST = (0, 3, 7, 18)
 
 
 @pytest.mark.parametrize("seed", [pytest.param(s, marks=() if s in FAST else pytest.mark.slow) for s in range(60)])
+@pytest.mark.by_day(2)
 def test_the_answer_is_where_a_descent_from_the_truth_ends(seed: int, tmp_path: Path) -> None:
     found, at_truth = outcome(seed, tmp_path)
     assert at_truth, found.message

@@ -120,6 +120,7 @@ DOUBLE = {
 }
 
 
+@pytest.mark.slow
 def test_a_whole_recording_with_exchanged_markers_contradicts_the_model() -> None:
     problem = Problem.parse(DOUBLE, "double")
     right = measure(problem, problem.load_scene())

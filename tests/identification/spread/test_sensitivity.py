@@ -201,6 +201,7 @@ def test_intervals_at_the_minimum_of_a_long_chaotic_record_hold_the_truth() -> N
 
 
 @pytest.mark.parametrize(("tolerance", "verdict"), [(1e-8, Verdict.UNFINISHED), (1e-6, Verdict.IDENTIFIED)])
+@pytest.mark.slow
 def test_a_misfit_only_where_no_derivatives_hold_is_not_held_against_the_model(
     tolerance: float, verdict: Verdict
 ) -> None:

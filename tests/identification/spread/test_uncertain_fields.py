@@ -70,6 +70,7 @@ def record(folder: Path, speed_squared: float, rng: np.random.Generator) -> None
         ([{"bodies.m.mass": 0.02, "loads.known.stiffness": SPEED_SQUARED * 0.02}], 0.0),
     ],
 )
+@pytest.mark.by_day(2)
 def test_a_stiffness_is_known_as_well_as_the_mass_and_the_other_spring(
     uncertainties: Any, expected: float, tmp_path: Path
 ) -> None:

@@ -114,6 +114,7 @@ def test_intervals_contain_the_truth_as_often_as_they_say(case) -> None:  # type
 
 
 @pytest.mark.parametrize("count", [4, 8, 16, 60])
+@pytest.mark.by_day(2)
 def test_a_stated_noise_is_taken_at_its_word_by_few_samples(count: int) -> None:
     """Intervals of a straight line, as wide as its closed form says but for what little memory chance shows."""
     times, seeds = np.linspace(-1.0, 1.0, count), 200

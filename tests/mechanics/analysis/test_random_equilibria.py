@@ -76,6 +76,7 @@ def check(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(FEW))
+@pytest.mark.by_day(2)
 def test_a_chain_rests_and_swings_as_statics_and_modes_say(seed: int) -> None:
     check(seed)
 

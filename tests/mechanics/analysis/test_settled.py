@@ -46,6 +46,7 @@ def cantilever(element: str, **more: Any) -> Scene:
         pytest.param("director-rod", {"dimensions": 3}, 1e-3, marks=pytest.mark.slow),
     ],
 )
+@pytest.mark.by_day(1)
 def test_the_tolerance_is_kept_against_the_elastica(element: str, more: dict[str, Any], tolerance: float) -> None:
     found = settled(cantilever(element, **more), tolerance)
     assert found.ok
@@ -56,6 +57,7 @@ def test_the_tolerance_is_kept_against_the_elastica(element: str, more: dict[str
 
 @pytest.mark.parametrize("quadrature", ["full", "reduced"])
 @pytest.mark.parametrize("elements", [2, 4, 8])
+@pytest.mark.by_day(2)
 def test_without_a_tolerance_the_error_against_the_elastica_is_told(quadrature: str, elements: int) -> None:
     """And by half too large at most: cables converge faster than the second order that is believed."""
     scene = cantilever("ancf-cable").with_values({"bodies.B.quadrature": quadrature, "bodies.B.elements": elements})

@@ -297,6 +297,7 @@ Smith, Thresher and Wang, Vibration modes of centrifugally stiffened beams, J. A
 
 
 @pytest.mark.parametrize("speed", WRIGHT)
+@pytest.mark.by_day(2)
 def test_rotating_blades_flap_as_in_the_tables_and_lag_as_southwell_says(speed: int) -> None:
     side, density, modulus = 0.02, 2700.0, 7e10
     unit = np.sqrt(modulus * side**2 / 12 / density)
@@ -423,6 +424,7 @@ def test_a_campbell_diagram_finds_the_critical_speed() -> None:
 
 
 @pytest.mark.parametrize("name", ["single-pendulum", "rigid-double-pendulum", "flexible-double-pendulum"])
+@pytest.mark.by_day(1)
 def test_what_swings_has_no_steady_motion(name: str) -> None:
     scene = load_scene(name)
     moving = scene.with_values({f"initial.{body}.rate": 1.0 for body in scene.bodies})

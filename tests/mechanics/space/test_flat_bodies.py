@@ -101,6 +101,7 @@ def moved(kind: str, inertia: Any, time: float) -> Any:
 
 
 @pytest.mark.parametrize("kind", list(JOINTS))
+@pytest.mark.by_day(2)
 def test_a_plate_moves_as_newton_and_euler_say_in_as_few_steps_as_a_thick_one(kind: str) -> None:
     places, steps = end(plates(kind, FLAT), 0.2)
     assert places == pytest.approx(moved(kind, FLAT, 0.2), abs=1e-9)
@@ -143,6 +144,7 @@ def test_other_ways_to_the_acceleration_find_the_same(method: str) -> None:
 
 @pytest.mark.parametrize("kind", ["slider", "point in a plane", "free"])
 @pytest.mark.parametrize("integrator", ["leapfrog", "rk4"])
+@pytest.mark.by_day(2)
 def test_no_joint_shortens_the_stable_step_of_a_plate(kind: str, integrator: str) -> None:
     """Springs make it as long as for a body with some thickness."""
     limit = stable_step(plates(kind, FLAT), integrator)

@@ -65,6 +65,7 @@ def rims(angle: Array, ratio: float) -> tuple[Array, Array]:
         if name != "auto"
     ],
 )
+@pytest.mark.by_day(2)
 def test_bevel_gears_turn_by_their_teeth_and_with_the_inertia_of_both(integrator: str) -> None:
     """phi_1 = t^2/2 T/(I_1 + r^2 I_2), phi_2 = r phi_1, each about its axis."""
     ratio = -17 / 40

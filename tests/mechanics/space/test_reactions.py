@@ -158,6 +158,7 @@ def test_what_a_loop_holds_twice_is_not_unique() -> None:
         ("director-rod", {"width": 0.006, "curvature": [0.5], "twist": [1.0]}),
     ],
 )
+@pytest.mark.by_day(2)
 def test_section_forces_balance_the_loads_beyond_the_section(element: str, more: dict[str, Any]) -> None:
     """A cantilever under its weight, a force and a torque at its end: the law of the lever, on any mesh."""
     force, torque, gravity = np.array([0.3, -2.0, 1.5]), np.array([0.05, 0.02, -0.03]), np.array([0.0, 1.0, -9.0])

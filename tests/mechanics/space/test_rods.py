@@ -43,6 +43,7 @@ def test_the_flexible_double_pendulum_moves_in_space_as_in_the_plane() -> None:
     both(load_scene("flexible-double-pendulum").model_dump(mode="json", exclude_unset=True), 0.2)
 
 
+@pytest.mark.slow
 def test_welded_damped_tapered_and_hinged_rods_move_in_space_as_in_the_plane() -> None:
     tip = {
         "kind": "rigid-body",
@@ -77,6 +78,7 @@ def test_a_rod_swings_in_any_plane_as_in_one() -> None:
 
 
 @pytest.mark.parametrize("element", ["ancf-cable", "ancf-quintic"])
+@pytest.mark.by_day(1)
 def test_a_damped_rod_bends_from_straight_in_any_plane_as_in_one(element: str) -> None:
     """The plane of round-off was damped alone, which blew up implicit steps (Kelvin and Voigt's material)."""
     wire = cable(1.0, 3, 1e10, element=element, retardation=2e-3, height=1.5e-3, width=1.5e-3)

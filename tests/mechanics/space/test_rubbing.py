@@ -48,6 +48,7 @@ def pendulum(mu: float, radius: float) -> Scene:
     return machine({"A": body}, {"O": pin}, {"A": {"body": "A", "point": [1.0, 0.0, 0.0]}}, gravity=[0.0, -G, 0.0])
 
 
+@pytest.mark.slow
 def test_a_tilted_pin_brakes_with_all_that_it_bears() -> None:
     """Its force from the motion of the centre of mass: integrated by scipy."""
     mu, radius, mass = 0.3, 0.05, 2.0

@@ -86,6 +86,7 @@ def check(seed: int, counts: tuple[int, int]) -> tuple[float, float]:
     return coarse, fine
 
 
+@pytest.mark.slow
 def test_a_random_rod_converges_to_kirchhoffs_and_its_mesh_error_is_told() -> None:
     """It is a third more than what twice as many elements change."""
     error, _ = check(0, (6, 12))

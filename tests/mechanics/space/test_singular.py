@@ -30,6 +30,7 @@ def test_a_machine_passes_its_singular_position(name: str) -> None:
 
 @pytest.mark.parametrize("name", list(MACHINES))
 @pytest.mark.parametrize("offset", [0.0, 1e-9, 1e-6, 1e-4])
+@pytest.mark.by_day(3)
 def test_started_at_any_distance_from_the_singular_position(name: str, offset: float) -> None:
     machine, reference = MACHINES[name]
     times = np.array([0.1, 0.5])

@@ -66,6 +66,7 @@ def test_a_wire_that_joints_stretch_has_the_tension_of_its_strain(element: str, 
 @pytest.mark.parametrize("element", ["ancf-cable", "ancf-quintic", "director-rod"])
 @pytest.mark.parametrize("kind", ["spherical", "weld"])
 @pytest.mark.parametrize("chord", [0.98, 0.85])
+@pytest.mark.by_day(2)
 def test_a_wire_that_joints_press_is_an_elastica(element: str, kind: str, chord: float) -> None:
     scene = between(chord, element, kind, section="round", height=1e-3)
     assert height(scene) == pytest.approx(elastica(chord), rel=4e-3)

@@ -82,6 +82,7 @@ RIGHT = [[0, 0, math.pi / 2], [0, 0, 0], [math.pi / 2, 0, 0], [0, -math.pi / 2, 
         *(([*one], None) for one in (OBLIQUE, (0, 0, 0.7), (0, 1e-3, 0), (-1.0, 2.0, 0.4))),
     ],
 )
+@pytest.mark.by_day(3)
 def test_a_frame_bends_and_twists_as_its_rods_do(rotation: Any, directors: str | None) -> None:
     """A cantilever of two rods in every position, small loads; sections hold each other by independent constraints."""
     force = 1e-5 * np.array([0.3, -0.5, 0.7])
@@ -117,6 +118,7 @@ def test_a_quarter_of_a_ring_and_a_rod_bend_and_twist_out_of_their_plane() -> No
 
 @pytest.mark.parametrize(("angle", "close"), [(math.pi / 2, 1e-12), (0.7, 1e-9), (-2.0, 1e-9)])
 @pytest.mark.parametrize("told", [False, True])
+@pytest.mark.by_day(2)
 def test_a_bent_pendulum_swings_in_space_as_in_the_plane(angle: float, close: float, told: bool) -> None:
     """With the same quadrature cables have the same theory; further axes of sections have a little inertia."""
 
@@ -157,6 +159,7 @@ SQUARE = {"height": 0.03, "width": 0.03}
         ((0, -math.pi / 2, 0), {"kind": "revolute", "axis": [0, 0, 1]}, (CABLE, SQUARE)),
     ],
 )
+@pytest.mark.by_day(2)
 def test_rods_hold_each_other_as_with_a_tiny_body_between(rotation: Any, joint: Any, rods: Any) -> None:
     A, B = rods
     with_none, with_one = (

@@ -42,6 +42,7 @@ def begin(scene: Scene) -> Any:
 
 
 @pytest.mark.parametrize("foot", ["weld", "revolute"])
+@pytest.mark.by_day(1)
 def test_welded_bodies_start_in_space_as_in_the_plane(foot: str) -> None:
     refused = 0
     for a, b, corner in itertools.product((None, 0.3), (None, 1.0), (None, 0.5)):
