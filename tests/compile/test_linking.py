@@ -148,6 +148,7 @@ print(alike.{name}(5.0))
 """
 
 
+@pytest.mark.slow
 def test_functions_that_differ_in_what_they_enclose_stay_apart(tmp_path: Path) -> None:
     """Sums and products of vectors are such: one name, the same types. Numba tells them apart within a process only."""
     (tmp_path / "alike.py").write_text(ALIKE)

@@ -306,6 +306,7 @@ def _sprung(kind: str, **more: Any) -> Scene:
     return Scene.parse(data)
 
 
+@pytest.mark.slow
 def test_a_spring_rests_where_it_starts() -> None:
     free = ENGINE.simulate(_mixed(), [0.0])
     rest = float(np.hypot(0.3 + np.cos(0.1), -0.2 + np.sin(0.1)))

@@ -444,6 +444,7 @@ def test_what_else_there_is_of_a_machine_is_logged() -> None:
         run.run_flow("design", {**asked["design"], "parameter": "theta3"})
 
 
+@pytest.mark.slow
 def test_forms_follow_the_library(tmp_path: Path, study: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of a server that runs: names come and go with `shoal library`, and nothing else of the form changes."""
     from prefect.client.orchestration import get_client

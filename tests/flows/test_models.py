@@ -178,6 +178,7 @@ def _shifted(fit: Fit) -> Any:
     return fit.estimate.predicted["recording"] + np.array([1e-3, 0.0])
 
 
+@pytest.mark.slow
 def test_champion_stays_where_validation_fails_and_the_tag_says_why(fits: list[Fit], no_nights: Path) -> None:
     assert registered(fits[0], "guarded").aliases == ["champion"]
     rejected = replace(fits[0], estimate=replace(fits[0].estimate, findings=[MISFIT.found("the best fit is off")]))

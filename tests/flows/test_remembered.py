@@ -51,6 +51,7 @@ def fits(measurement: Measurement) -> list[jobs.Fit]:
     return [remembered.run(fingerprint.of_cell(cell, measurement), jobs.fit, cell, measurement) for cell in cells]
 
 
+@pytest.mark.slow
 def test_a_killed_study_goes_on_where_it_was(computed: list[Any], measurement: Measurement) -> None:
     command = [sys.executable, "-c", STUDY]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as study:

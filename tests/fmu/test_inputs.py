@@ -84,6 +84,7 @@ def test_a_flexible_machine_moves_as_with_the_table(fmi: str, tmp_path: Path) ->
     np.testing.assert_allclose(np.column_stack([motion["B.x"], motion["B.y"]]), run.marker("B"), rtol=0, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_controller_holds_a_pendulum_upright(tmp_path: Path) -> None:
     """The host computes the torque from the motion: what no table could say ahead."""
     from fmpy.fmi2 import FMU2Slave

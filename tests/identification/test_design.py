@@ -73,6 +73,7 @@ def on_markers_of_the_scene() -> list[Sensor]:
 
 
 @pytest.mark.parametrize("place", [0, *(pytest.param(one, marks=pytest.mark.slow) for one in range(1, 5))])
+@pytest.mark.slow
 def test_predicted_deviation_is_the_scatter_of_fits(place: int) -> None:
     # 50 draws know a standard deviation to 10 %, so that 30 % is three of its own.
     candidate = on_markers_of_the_scene()[place]
@@ -158,6 +159,7 @@ def test_what_no_data_tell_is_infinite_and_null_in_json() -> None:
     assert text["message"].startswith("no sensor alone tells what is to be sharpened")
 
 
+@pytest.mark.slow
 def test_a_chaotic_motion_is_no_ground_for_a_design() -> None:
     found = design(problem(), duration=60.0, rate=5.0)
     assert not found.ok
@@ -192,6 +194,7 @@ def test_bad_wishes_are_refused_in_one_line(changes: dict[str, Any], options: di
     assert "\n" not in str(refusal.value)
 
 
+@pytest.mark.slow
 def test_the_command_designs_about_the_answer_and_draws(tmp_path: Path) -> None:
     picture = tmp_path / "design.png"
     options = ["design", "paper-case-1", "--noise", "0.002", "--json", "--out", str(picture)]

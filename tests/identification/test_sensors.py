@@ -301,6 +301,7 @@ def test_an_imu_of_another_engine_identifies_the_machine() -> None:
         assert value.lower - value.std < found.truth[name] < value.upper + value.std
 
 
+@pytest.mark.slow
 def test_the_command_reads_a_table_of_sensors_in_their_units(stated: Path) -> None:
     """g, degrees per second and kilonewtons, with a bias of the gyro that is sought."""
     computed = Problem.parse(problem(ALL), "felt")
@@ -382,6 +383,7 @@ def test_a_gauge_beside_its_rod_and_sensors_of_space_on_a_rod_are_refused(
     assert "\n" not in str(refusal.value)
 
 
+@pytest.mark.slow
 def test_a_strain_gauge_of_a_stick_that_is_let_go_tells_its_modulus(stated: Path) -> None:
     """Cables of Exudyn, that swing about the clamp after the load is gone."""
     free = cantilever(

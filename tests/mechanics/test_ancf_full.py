@@ -359,6 +359,7 @@ def test_a_cantilever_converges_to_the_director_rod_of_its_law(law: str) -> None
     assert np.log2(errors[0] / errors[1]) > 1.95
 
 
+@pytest.mark.slow
 def test_only_the_enhanced_law_bends_like_a_beam() -> None:
     """Tips of the shear-deformable beam with this shear factor, by its bending stiffness (Reissner's equations).
 

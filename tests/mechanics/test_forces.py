@@ -265,6 +265,7 @@ def test_lanes_are_what_they_are_alone() -> None:
             np.testing.assert_allclose(found[..., lane], alone[..., 0], rtol=1e-13, atol=1e-13 * np.abs(alone).max())
 
 
+@pytest.mark.slow
 def test_nothing_from_no_elements() -> None:
     tested = bench([], FULL_LAW)
     z = state(1)

@@ -164,6 +164,7 @@ def crank(mu: float, **more: Any) -> Scene:
                    gravity=[0, 0], **more)  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_dry_slider_takes_from_the_energy_what_presses_it_times_its_way() -> None:
     times = np.linspace(0.01, 1.0, 100)
     scene = crank(0.2)

@@ -97,6 +97,7 @@ def test_bounds_at_a_single_instant_can_be_seen(marginal: Any) -> None:
 
 
 @pytest.mark.parametrize("marginal", [(0.9, 1.1), "normal(1, 0.1)"])
+@pytest.mark.slow
 def test_nothing_is_drawn_between_few_instants(marginal: Any) -> None:
     """A band from 0.5 s to 1.5 s went straight past half a swing; many instants are a band as before."""
     path = "initial.OA.angle"

@@ -99,6 +99,7 @@ def test_autocorrelation_of_known_noise() -> None:
     assert np.all(np.abs(autocorrelation(noise)[1:]) < 0.03)
 
 
+@pytest.mark.slow
 def test_words_tell_noise_from_what_the_model_lacks(flexible: Answer, several: Answer) -> None:
     """One source: the picture says what the tests of the verdict say."""
     assert "none, like white noise" in white(several.estimate)
@@ -188,6 +189,7 @@ def test_a_design_is_drawn(flexible: Answer) -> None:
     assert all(axes.get_xlabel() for axes in figure.axes)
 
 
+@pytest.mark.slow
 def test_a_design_is_a_page_that_shows_the_best_sensor_of_every_kind(flexible: Answer, tmp_path: Path) -> None:
     sizes = {"acceleration": 0.05, "rate": 0.005, "strain": 1e-6}
     found = design(flexible.problem, noise=0.002, sensor_noise=sizes, at={"theta1": 0.78, "theta2": 0.52})

@@ -118,6 +118,7 @@ def test_a_file_keeps_everything(several: Answer) -> None:
     assert not same(several.estimate, changed)
 
 
+@pytest.mark.slow
 def test_report_from_files(flexible: Answer, tmp_path: Path) -> None:
     for name in ("one.json", "two.json"):
         files.estimate(flexible.estimate, flexible.problem, tmp_path / name)

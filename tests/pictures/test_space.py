@@ -163,6 +163,7 @@ def test_flexible_rods_in_space_are_round_and_bend() -> None:
     assert found.bars["R"].edges is found.bars["R"].axis
 
 
+@pytest.mark.slow
 def test_page_moving_picture_and_drawing_by_one_command(tmp_path: Path) -> None:
     scene = machine(
         bodies={"P": {"kind": "point-mass", "mass": 1.0}},

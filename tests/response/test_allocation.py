@@ -73,6 +73,7 @@ def test_tolerances_of_intervals() -> None:
     assert again.limits[0].kept
 
 
+@pytest.mark.slow
 def test_deviations_of_distributions() -> None:
     """The probability that was asked for is kept, and FORM's effects are those of the closed form."""
     target = 1e-4
@@ -190,6 +191,7 @@ def test_the_tolerance_of_one_distribution(text: str, law: Any, limit: float) ->
         assert told.effects == pytest.approx([1 - chance(0.99) / chance(1.0)], rel=0.1)
 
 
+@pytest.mark.slow
 def test_the_tolerances_of_two_uniform_parameters() -> None:
     """P(h + v / 2 > b) = (a + c - b)^2 / 8 a c for half widths a, c: a limit that bends in the space of FORM."""
     target, room, halves = 1e-2, 0.12, np.array([0.1, 0.06])

@@ -113,6 +113,7 @@ def test_the_probability_of_an_energy_by_every_way(way: str) -> None:
         assert told["lower"] <= exact <= told["upper"]
 
 
+@pytest.mark.slow
 def test_energies_of_an_oscillator() -> None:
     """1/2 k A^2 in all, of which sin^2(w t) is that of the motion; the mass differs by lanes."""
     scene = Scene.parse(oscillator(turned=False))

@@ -132,6 +132,7 @@ def test_statistics_of_an_oscillator() -> None:
     assert answer.runs.evaluations <= 300
 
 
+@pytest.mark.slow
 def test_few_terms_of_many() -> None:
     """Eight normal variables of which a few matter, in closed form: mean and deviation within 1e-3 with 300 runs."""
     function = model(
@@ -159,6 +160,7 @@ def test_polynomials_that_run_away_outside_of_all_runs_are_seen() -> None:
     assert answer.statistics.std[0] == pytest.approx(math.sqrt(variance.sum()), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_indices_of_ishigamis_function() -> None:
     """S1 = .31390519, S2 = .44241114, ST1 = .55758886 (Ishigami and Homma, 1990, a = 7, b = 0.1)."""
     angle = Uniform(-math.pi, math.pi)

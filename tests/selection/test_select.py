@@ -70,6 +70,7 @@ def test_stiff_rods_bend_by_a_few_modes_and_keep_their_word_against_exudyn() -> 
     assert selection.trajectory.distance(theirs) <= 1e-3
 
 
+@pytest.mark.slow
 def test_rods_with_shear_bend_by_modes_where_that_is_enough() -> None:
     """Seed 158 of the random machines: elements take 480 times the work. Judged by 8 rods with shear each."""
     machine = draw(158)
@@ -86,6 +87,7 @@ def test_rods_with_shear_bend_by_modes_where_that_is_enough() -> None:
     assert found.trajectory.distance(judge) <= machine.tolerance
 
 
+@pytest.mark.slow
 def test_rods_with_damping_have_models_too() -> None:
     """Cables of them have no reduced quadrature. Judged by twice as many quintic elements as the reference's."""
     damped = _with_modulus(2e8).with_values({f"bodies.{rod}.retardation": 1e-3 for rod in ("OA", "AB")})

@@ -108,6 +108,7 @@ def test_growth_follows_from_the_equations_of_the_heavy_top() -> None:
     assert MOTIONS["heavy-top"].growth == pytest.approx(growth, rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_top_that_spins_fast_precesses_as_textbooks_say() -> None:
     """Steadily at m g l / (C s), with a nutation that falls with the square of its spin; 15 kg at 1 m, C = 0.46875."""
     spin, times = 4000.0, np.linspace(0.0, 4.0, 3)

@@ -129,6 +129,7 @@ def test_a_write_that_fails_leaves_the_old_file(tmp_path: Path, monkeypatch: pyt
     assert [(file.name, file.read_text()) for file in tmp_path.iterdir()] == [("index.html", "old")]
 
 
+@pytest.mark.slow
 def test_a_crash_costs_one_line() -> None:
     """The lines after it are measured by a new process."""
     crash = replace(line(method="crash"), run=partial(os._exit, 7))
@@ -143,6 +144,7 @@ def test_a_run_that_hangs_is_stopped() -> None:
         assert worker.measure(partial(time.sleep, 60), 0.2).status == "timeout"
 
 
+@pytest.mark.slow
 def test_a_real_line_is_measured_in_the_worker() -> None:
     real = Line("pendulum", "gauss", "default", 1e-9, "order 8", partial(motion, "pendulum", "gauss", {}))
     impossible = Line("four-bar-2", "casadi", "cvodes", 1e-9, "", partial(motion, "four-bar-2", "casadi", {}))

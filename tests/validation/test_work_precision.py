@@ -180,6 +180,7 @@ def test_tables_tell_what_an_error_costs() -> None:
     assert problem.reference.source in text
 
 
+@pytest.mark.slow
 def test_what_an_error_costs_can_be_measured_again() -> None:
     studies, _ = load(Path(__file__).parents[2] / "docs" / "charts")
     kept = next(one for one in studies if one.problem.name == "flexible-hanging")

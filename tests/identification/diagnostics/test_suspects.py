@@ -77,12 +77,14 @@ def test_a_wrong_clock() -> None:
     assert "the clock: a factor of 1.26 would lower the misfit from" in str(named["clock"])
 
 
+@pytest.mark.slow
 def test_a_wrong_scale() -> None:
     named = found(TIP / 1.1, TIMES)
     assert named["scale"].value == pytest.approx(1.1, rel=2e-3)
     assert next(iter(named)) == "scale"
 
 
+@pytest.mark.slow
 def test_a_tilted_camera() -> None:
     c, s = np.cos(0.2), np.sin(0.2)
     named = found(TIP @ np.array([[c, -s], [s, c]]), TIMES)
@@ -96,6 +98,7 @@ def test_a_shifted_origin() -> None:
     assert named["x"].value == pytest.approx(0.15, abs=2e-3)
 
 
+@pytest.mark.slow
 def test_a_late_start() -> None:
     """Recorded time 0 is 0.1 s after the release."""
     named = found(tip(TIMES + 0.1, np.pi / 4, np.pi / 6), TIMES)
@@ -176,6 +179,7 @@ def test_the_zero_of_a_real_encoder() -> None:
     assert named["tilt"].after < 6e-4
 
 
+@pytest.mark.slow
 def test_a_place_beside_the_axis_of_a_rigid_rod_keeps_it_rigid(tmp_path: Path) -> None:
     """Outliers in a pendulum by scipy are rejected, though the rod, with a place beside its axis, cannot be bent."""
     rod = {"kind": "rod", "length": 0.8, "height": 0.02, "width": 0.02, "density": 6250.0}

@@ -111,6 +111,7 @@ def test_a_marker_off_its_place_on_a_body(place: str | list[float], words: str) 
     assert words in first.change
 
 
+@pytest.mark.slow
 def test_a_marker_that_was_lost_for_a_while_is_told_with_its_time() -> None:
     """M stands still from 1 s to 1.3 s, where it moves by many times the noise; a wrong gravity is no such stretch."""
     model = model_of({})

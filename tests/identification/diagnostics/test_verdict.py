@@ -100,6 +100,7 @@ def judged(noise: float | None, more: np.ndarray) -> Estimate:
     return identify(stated, method="least-squares", measurement=recorded(stated, more))
 
 
+@pytest.mark.slow
 def test_a_noise_that_was_stated_too_small_is_told_and_no_wrong_model() -> None:
     draws = np.random.default_rng(5).standard_normal((150, 2))
     estimate = judged(1e-3, 1.3e-3 * draws)

@@ -173,6 +173,7 @@ def test_draws_that_were_stopped_do_not_call_themselves_converged(fall: str, mon
     assert "posterior-not-converged" in estimate.codes
 
 
+@pytest.mark.slow
 def test_what_cannot_be_simulated_is_impossible_and_counted(fall: str) -> None:
     """Half of the space fails: no draw is there."""
     problem, measurement = thrown(fall)
@@ -202,6 +203,7 @@ def test_what_cannot_be_simulated_is_impossible_and_counted(fall: str) -> None:
     assert np.all(found.flat[:, 1] <= limit)
 
 
+@pytest.mark.slow
 def test_the_command_prints_the_draws_worth_and_writes_what_arviz_reads(fall: str, tmp_path: Path) -> None:
     problem, measurement = thrown(fall)
     stated, table, kept = tmp_path / "thrown.yaml", tmp_path / "thrown.csv", tmp_path / "draws.nc"

@@ -286,6 +286,7 @@ def swing(t: Any) -> tuple[Any, Any, Any]:
 @pytest.mark.parametrize(
     "how", ["lanes", "courses", *(pytest.param(how, marks=pytest.mark.slow) for how in ("states", "course"))]
 )
+@pytest.mark.slow
 def test_turns_are_counted_from_where_statics_puts_the_machine(how: str) -> None:
     """They were counted from the stated angles: a spring wound by 5 rad was felt as one wound by 5 - 2 pi."""
     scene, values = wheel(), {"bodies.wheel.mass": np.full(2, 2.0)}

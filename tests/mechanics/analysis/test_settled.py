@@ -67,6 +67,7 @@ def test_without_a_tolerance_the_error_against_the_elastica_is_told(quadrature: 
     assert error <= found.errors.estimates["mesh"] <= 1.5 * error
 
 
+@pytest.mark.slow
 def test_an_error_that_cancels_on_one_mesh_is_told_on_the_next() -> None:
     """A taper, bent far: r' = (1 + N / EA) t, E I(s) theta' = M, M' = -r' x F.
 

@@ -228,6 +228,7 @@ def test_frequencies_are_those_in_the_motion_by_scipy() -> None:
         assert bins / (len(times) * times[1]) == pytest.approx(found, abs=0.1)
 
 
+@pytest.mark.slow
 def test_tops_nutate_as_lagrange_and_routh_say() -> None:
     """Steady precessions of random tops, slow and fast; nutation from the effective potential; and sleeping tops."""
     rng = np.random.default_rng(54)
@@ -401,6 +402,7 @@ def test_a_light_shaft_with_an_overhung_disc_is_stodolas_rotor() -> None:
         assert sorted(told) == pytest.approx(sorted(expected), rel=1e-4)
 
 
+@pytest.mark.slow
 def test_a_campbell_diagram_finds_the_critical_speed() -> None:
     """A disc on a ball and round springs: w^2 Id - w Ip W - k = 0 meets w = W at (k / (Id - Ip))^1/2."""
     polar, diametral, stiffness = 0.01, 0.03, 2e3

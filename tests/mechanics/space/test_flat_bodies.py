@@ -126,6 +126,7 @@ def test_many_plates_move_as_one(kind: str) -> None:
 
 
 @pytest.mark.parametrize("count", [1, 4])
+@pytest.mark.slow
 def test_plates_side_by_side_move_as_alone(count: int) -> None:
     largest = 0.04 * (1 - np.tile([0.0, 1e-7, 1e-3, 0.1], 4))
     scene = plates("slider", FLAT, count)
