@@ -94,3 +94,24 @@ def sentence(text: str) -> str:
     """Return a clause with its capital and its full stop; an identifier at its beginning keeps its case."""
     first, _, rest = text.partition(" ")
     return f"{first.capitalize() if first.isalpha() and first.islower() else first} {rest}".strip().rstrip(".") + "."
+
+
+class Concluded:
+    """Base of answers that have findings: what follows from these."""
+
+    findings: list[Finding]
+
+    @property
+    def codes(self) -> list[str]:
+        """The codes of the findings, in their order."""
+        return [one.code for one in self.findings]
+
+    @property
+    def message(self) -> str:
+        """The findings in one line."""
+        return message(self.findings)
+
+    @property
+    def advice(self) -> list[str]:
+        """Steps to take next."""
+        return steps(self.findings)

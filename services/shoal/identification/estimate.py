@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from shoal.errors import InputError
-from shoal.findings import Finding, message, steps
+from shoal.findings import Concluded, Finding
 from shoal.identification.dataset import dataset
 from shoal.identification.diagnostics.hypotheses import Hypothesis
 from shoal.identification.diagnostics.residual_tests import ResidualTests
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Estimate:
+class Estimate(Concluded):
     """Result of an identification. fitness: mean squared deviation; rms: per observed thing (position or angle).
 
     history: evaluations and the best fitness after them; iterations: (iteration, best, mean fitness)
@@ -95,21 +95,6 @@ class Estimate:
     def verdict(self) -> Verdict:
         """What may be made of the answer: the worst verdict that its findings imply."""
         return verdict_of(self.findings)
-
-    @property
-    def codes(self) -> list[str]:
-        """The codes of the findings, in their order."""
-        return [one.code for one in self.findings]
-
-    @property
-    def message(self) -> str:
-        """The findings in one line."""
-        return message(self.findings)
-
-    @property
-    def advice(self) -> list[str]:
-        """What to do next."""
-        return steps(self.findings)
 
     @property
     def status(self) -> str:

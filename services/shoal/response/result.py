@@ -11,7 +11,7 @@ import numpy as np
 from shoal.engines.starts import Elsewhere
 from shoal.error_budget import GOOD, ErrorBudget, Grade
 from shoal.errors import InputError
-from shoal.findings import Finding, message, steps
+from shoal.findings import Concluded, Finding
 from shoal.response.allocation import Allocation
 from shoal.response.boxes import Boxes
 from shoal.response.control import unseen
@@ -55,7 +55,7 @@ class Bounds:
 
 
 @dataclass(frozen=True, eq=False)
-class Response:
+class Response(Concluded):
     """How the markers of a scene may move.
 
     findings: about the answer, the decisive first; why: what the method did; times: instants [s]; markers: names;
@@ -101,21 +101,6 @@ class Response:
     def status(self) -> ResponseStatus:
         """The worst status that the findings imply."""
         return status_of(self.findings)
-
-    @property
-    def codes(self) -> list[str]:
-        """The codes of the findings, in their order."""
-        return [one.code for one in self.findings]
-
-    @property
-    def message(self) -> str:
-        """The findings in one line."""
-        return message(self.findings)
-
-    @property
-    def advice(self) -> list[str]:
-        """Steps to take next."""
-        return steps(self.findings)
 
     @property
     def mesh_error(self) -> float | None:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from shoal.error_budget import ErrorBudget, Grade
-from shoal.findings import Finding, message, steps
+from shoal.findings import Concluded, Finding
 from shoal.mechanics.analysis.findings import EquilibriumStatus, status_of
 from shoal.mechanics.analysis.joint_reactions import Reactions
 from shoal.mechanics.numerics.tile import Array
@@ -19,7 +19,7 @@ from shoal.trajectory import plain
 
 
 @dataclass(frozen=True, eq=False)
-class Equilibrium:
+class Equilibrium(Concluded):
     """A state of rest, and the evidence for it.
 
     scene: as it was given. findings: about the search and the state. balanced: whether the forces balance, stably or
@@ -62,21 +62,6 @@ class Equilibrium:
     def status(self) -> EquilibriumStatus:
         """The worst status that the findings imply."""
         return status_of(self.findings)
-
-    @property
-    def codes(self) -> list[str]:
-        """The codes of the findings, in their order."""
-        return [one.code for one in self.findings]
-
-    @property
-    def message(self) -> str:
-        """The findings in one line."""
-        return message(self.findings)
-
-    @property
-    def advice(self) -> list[str]:
-        """Steps to take next."""
-        return steps(self.findings)
 
     @property
     def errors(self) -> ErrorBudget:
