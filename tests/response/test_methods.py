@@ -11,12 +11,12 @@ from shoal.response import respond
 from shoal.response.inputs import Inputs, UncertainParameter
 from shoal.response.marginals import Interval, Normal
 from shoal.response.methods import get_method
-from shoal.response.methods.maximum_entropy import entropic_quantiles
-from shoal.response.methods.polynomial_fits import sparse_grid
 from shoal.response.runs import Answers, CachedModel
 from shoal.response.statistics import QUANTILES
 from shoal.response.study import Found, Study
 from shoal.trajectory import Array
+from shoal_validation.methods.maximum_entropy import entropic_quantiles
+from shoal_validation.methods.polynomial_fits import sparse_grid
 
 
 def made(method: str, function: object, parameters: int, **wanted: int | None) -> tuple[Found, CachedModel]:

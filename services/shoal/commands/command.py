@@ -28,9 +28,9 @@ def _methods() -> str:
 
 
 def _responses() -> str:
-    from shoal.response.methods import METHODS
+    from shoal.response.methods import methods
 
-    return ", ".join(METHODS)
+    return ", ".join(methods())
 
 
 def _probabilities() -> str:

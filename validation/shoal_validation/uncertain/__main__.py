@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 
-from shoal.response.methods import METHODS
+from shoal.response.methods import methods
 
 from shoal_validation.document import publish, table
 from shoal_validation.resumed import resumed
@@ -67,7 +67,7 @@ def main(arguments: list[str]) -> bool:
     if chosen.only in (None, "reached"):
         told["uncertain-reached"] = reached_table(list(reached.all_of_them(quick=chosen.quick)))
     if chosen.only in (None, "map"):
-        cells = maps.surveyed([name for name in METHODS if name not in NOT_FOR_INTERVALS], quick=chosen.quick)
+        cells = maps.surveyed([name for name in methods() if name not in NOT_FOR_INTERVALS], quick=chosen.quick)
         told["uncertain-map"] = chart.findings(cells)
         chart.draw(cells, chosen.chart)
         good = good and not any(one.silent for one in cells if one.method == "auto")
@@ -81,7 +81,7 @@ def compared(*, quick: bool) -> list[Line]:
     for problem in PROBLEMS:
         if not quick or problem.parameters == 1:
             low, high = problem.reference()
-            lines += [measured(problem, method, low, high) for method in METHODS if method not in NOT_FOR_INTERVALS]
+            lines += [measured(problem, method, low, high) for method in methods() if method not in NOT_FOR_INTERVALS]
             for name, (method, options) in VARIANTS.items():
                 lines.append(replace(measured(problem, method, low, high, **options), method=name))
     return lines

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
-
 from shoal.response.extremes import Surrogate
 from shoal.response.study import Found, Method, Study
 from shoal.trajectory import Array
@@ -35,11 +33,3 @@ def fitted(name: str, plan: Callable[[Study], Plan]) -> Method:
         return Found(planned.about, planned.fit(study))
 
     return method
-
-
-def star_and_sobol(study: Study, each: int) -> Array:
-    """Return the centre, the ends of all axes, and `count` quasi-random places, by default `each` a parameter."""
-    parameters = len(study.inputs)
-    count = min(study.count or each * parameters, study.runs.left - 2 * parameters - 1)
-    unit = np.eye(parameters)
-    return np.vstack([np.zeros((1, parameters)), unit, -unit, study.inputs.sobol(count, study.seed)])

@@ -1,16 +1,9 @@
-"""Sampling without a surrogate: random (Monte Carlo), quasi-random (Sobol's sequence), a grid, and corners.
-
-Sobol's indices come with quasi-random runs. `scan` is the "exact" reference of the literature; `vertices` is exact
-where answers are monotonic (Dong and Shah 1987).
-"""
+"""Sampling without a surrogate: random (Monte Carlo), or quasi-random, from which Sobol's indices follow."""
 
 from __future__ import annotations
 
-from itertools import product
-
 import numpy as np
 
-from shoal.response.extremes import corners
 from shoal.response.indices import designs, jansen
 from shoal.response.study import Found, Study
 
@@ -50,21 +43,3 @@ def of_distributions(study: Study, count: int) -> Found:
     if study.runs.failed > failed:
         return Found(f"{made} quasi-random runs; some failed, so that there are no indices")
     return Found(f"{made} quasi-random runs", indices=jansen(study.runs.values[-total:], parameters))
-
-
-def scan(study: Study) -> Found:
-    """Run a grid of `degree` + 1 places along each axis, or as many as fit, at most 65. Raises InputError."""
-    study.intervals_only("scan")
-    parameters = len(study.inputs)
-    most = int(study.runs.left ** (1 / parameters) + 1e-9)
-    places = study.degree + 1 if study.degree else max(2, min(65, most))
-    study.runs(np.array(list(product(np.linspace(-1, 1, places), repeat=parameters))))
-    return Found(f"a grid of {places} places along each of {parameters} axes")
-
-
-def vertices(study: Study) -> Found:
-    """Run the 2^p corners of the box and its centre. Raises InputError."""
-    study.intervals_only("vertices")
-    parameters = len(study.inputs)
-    study.runs(np.concatenate([np.zeros((1, parameters)), corners(parameters)]))
-    return Found(f"the {2**parameters} corners of the box and its centre")

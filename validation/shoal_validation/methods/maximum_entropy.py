@@ -1,14 +1,12 @@
 """The density that is least committed of those with the moments of the runs (maximum entropy), and its quantiles.
 
 Jaynes, Information theory and statistical mechanics, Physical Review 106, 1957; by Newton's method on the convex dual
-(Mead and Papanicolaou, Maximum entropy in the problem of moments, Journal of Mathematical Physics 25, 1984). For
-comparison.
+(Mead and Papanicolaou, Maximum entropy in the problem of moments, Journal of Mathematical Physics 25, 1984).
 """
 
 from __future__ import annotations
 
 import numpy as np
-
 from shoal.response.inputs import BoolArray
 from shoal.response.methods.sampling import of_distributions
 from shoal.response.polynomials import LEGENDRE

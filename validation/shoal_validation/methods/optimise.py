@@ -3,7 +3,7 @@
 A search polls a star around its best place and follows the parabolas along the axes (pattern search with a local model:
 Torczon, On the convergence of pattern search algorithms, SIAM Journal on Optimization 7, 1997). Searches at one place
 share one star, so that the place of an extremum at one instant is where the search at the next one begins. What no
-search found, none can tell of: there is no gap. For comparison.
+search found, none can tell of: there is no gap.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
 from shoal.response.study import Found, Study
 from shoal.trajectory import Array
 

@@ -1,4 +1,4 @@
-"""Polynomials at a fixed number of runs, for comparison: Chebyshev's inclusion function and its variants, Legendre.
+"""Polynomials at a fixed number of runs: Chebyshev's inclusion function and its variants, Legendre.
 
 - `chebyshev`: interpolation at tensor products of Chebyshev's zeros (Wu, Zhang, Chen and Luo, A Chebyshev interval
   method for nonlinear dynamic systems under uncertainty, Applied Mathematical Modelling 37, 2013).
@@ -17,7 +17,6 @@ import math
 from itertools import product
 
 import numpy as np
-
 from shoal.response.design import telling
 from shoal.response.expansion import fit
 from shoal.response.methods.fitted import Plan

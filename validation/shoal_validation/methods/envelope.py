@@ -1,4 +1,4 @@
-"""Slow part, amplitude and phase of a course, each a polynomial of the parameters at every instant. For comparison.
+"""Slow part, amplitude and phase of a course, each a polynomial of the parameters at every instant.
 
 RS-HT splits by the Hilbert transform (Huang et al., The empirical mode decomposition and the Hilbert spectrum for
 nonlinear and non-stationary time series analysis, Proceedings of the Royal Society A 454, 1998); it errs at both ends
@@ -16,7 +16,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import make_interp_spline
 from scipy.signal import hilbert
-
 from shoal.errors import InputError
 from shoal.response.course import UnsuitableError, refuse_without_course, spline, turning_points, watch
 from shoal.response.expansion import Expansion, fit

@@ -4,7 +4,7 @@ Interval perturbation (Qiu and Wang, Comparison of dynamic response of structure
 using non-probabilistic interval analysis method and probabilistic approach, International Journal of Solids and
 Structures 40, 2003), of second order and with subintervals (Qiu and Elishakoff, Antioptimization of structures with
 large uncertain-but-non-random parameters via interval analysis, Computer Methods in Applied Mechanics and Engineering
-152, 1998). For comparison.
+152, 1998).
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from itertools import combinations, product
 
 import numpy as np
-
 from shoal.errors import ComputationError
 from shoal.response.expansion import Expansion, fit
 from shoal.response.inputs import IntArray
