@@ -13,7 +13,7 @@ from shoal.engines import sweep as sweeping
 from shoal.engines.gauss import GaussEngine
 from shoal.errors import InputError
 from shoal.identification import Estimate, Measurement, identify, load_problem, measure
-from shoal.identification.conclude import Wishes
+from shoal.identification.conclude import Options
 from shoal.notebook import machine, motion
 from shoal.pictures.answer import Answer
 from shoal.requests.simulate import Simulate
@@ -97,7 +97,7 @@ def fit(cell: Cell, measurement: Measurement) -> Fit:
         measurement=measurement,
         tolerance=cell.tolerance,
         time_limit=cell.time_limit,
-        wishes=Wishes(cell.profiles, cell.bootstrap, cell.sample),
+        options=Options(cell.profiles, cell.bootstrap, cell.sample),
     )
     return with_motion(cell, estimate)
 

@@ -24,7 +24,7 @@ from shoal.identification.carried import carried
 from shoal.identification.problem import as_problem
 from shoal.identification.recording.reading import YAML, described
 from shoal.identification.recording.source import Channel, FileSource
-from shoal.identification.recording.unit_line import with_units
+from shoal.identification.recording.units import with_units
 from shoal.requests.function import stated
 from shoal.response.read import by_name
 from shoal.scene.load import as_scene

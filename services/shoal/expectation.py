@@ -11,13 +11,17 @@ import numpy as np
 from shoal.engines import get_engine
 from shoal.engines.capabilities import require
 from shoal.errors import ComputationError, InputError
-from shoal.identification.recording.felt import asking, equipped, from_start
 from shoal.identification.recording.observation import camera, observe
 from shoal.identification.recording.plausible import check_units
 from shoal.identification.recording.reading import described, sampled
-from shoal.identification.recording.sensor_checks import check_felt
 from shoal.identification.recording.source import Channel, FileSource
 from shoal.identification.recording.units import QUANTITIES as UNITS
+from shoal.identification.recording.virtual_sensors import (
+    check_sensors,
+    engine_options,
+    from_start,
+    with_sensor_markers,
+)
 from shoal.scene import Scene
 from shoal.scene.expect import Expectation, ExpectedEngine, ExpectedRecording, ExpectedValue
 from shoal.shelf import located
@@ -98,7 +102,7 @@ def _recording(scene: Scene, expected: ExpectedRecording, document: Path) -> Que
                 known = ", ".join(scene.markers)
                 raise InputError(f"path: {expected.path}: channels: no marker {marker!r}; there are {known}")
     own = scene.with_values(source.known)
-    check_felt(own, channels)
+    check_sensors(own, channels)
     found, source = sampled(source, channels)
     check_units(source, found.channels, found.times, found.values, scene, sized=False)
     instants = found.times / source.clock + source.delay
@@ -106,16 +110,16 @@ def _recording(scene: Scene, expected: ExpectedRecording, document: Path) -> Que
         raise InputError(f"path: {expected.path}: delay: the first sample would be {-first:g} s before the motion")
 
     wanted, native = from_start(instants, channels), get_engine("gauss")
-    options = asking(native, own, channels)
+    options = engine_options(native, own, channels)
 
     def away(trajectory: Trajectory) -> float:
         if options:
-            trajectory = native.simulate(equipped(own, channels), wanted, **options)
+            trajectory = native.simulate(with_sensor_markers(own, channels), wanted, **options)
         seen = observe(trajectory, channels, camera(source), own)[0, len(wanted) - len(instants) :]
         return float(np.sqrt(np.nanmean(np.square(seen - found.values), axis=0).max()))
 
     unit = " or ".join(dict.fromkeys(UNITS[channel.quantity] for channel in channels))
-    return Question(equipped(own, channels), wanted, f"recording {expected.path}", unit, away)
+    return Question(with_sensor_markers(own, channels), wanted, f"recording {expected.path}", unit, away)
 
 
 def _called_so(scene: Scene, source: FileSource) -> list[Channel]:

@@ -324,7 +324,7 @@ def identify(asked: Identify) -> Estimate:
     """
     from shoal.identification import Estimate, identify
     from shoal.identification.carried import carried
-    from shoal.identification.conclude import Wishes
+    from shoal.identification.conclude import Options
     from shoal.identification.problem import as_problem
 
     shown(Estimate)
@@ -336,7 +336,7 @@ def identify(asked: Identify) -> Estimate:
             values=asked.set,
             fitted=None if asked.values is None else carried(asked.values),
             checkpoint=None if asked.checkpoint is None else Path(asked.checkpoint),
-            wishes=Wishes(asked.profiles, asked.bootstrap, asked.sample),
+            options=Options(asked.profiles, asked.bootstrap, asked.sample),
             progress=asked.progress or (lambda *_: None),
             **{name: getattr(asked, name) for name in same},
         )

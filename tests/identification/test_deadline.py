@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from shoal.errors import InputError
 from shoal.identification import Problem, Verdict, identify
-from shoal.identification.conclude import Wishes
+from shoal.identification.conclude import Options
 from shoal.identification.deadline import Deadline, TimeIsUp, unless_late
 from shoal.mechanics.simulate import simulate
 from shoal.scene import load_scene
@@ -164,7 +164,7 @@ def exchanged(folder: Path) -> Problem:
 CASES: dict[str, tuple[dict[str, Any], int]] = {
     "auto": ({}, 24),
     "multi-start": ({"method": "multi-start"}, 174),
-    "all wishes": ({"wishes": Wishes(profiles=True, bootstrap=5, sample=20)}, 310),
+    "all options": ({"options": Options(profiles=True, bootstrap=5, sample=20)}, 310),
     "held out": ({"hold_out": [(1.5, 2.0)]}, 57),
     "tolerance": ({"tolerance": 1e-3}, 42),
     "exchanged": ({"method": "multi-start"}, 1800),

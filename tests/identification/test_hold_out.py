@@ -14,10 +14,10 @@ from shoal.errors import InputError
 from shoal.identification import Estimate, Problem, Verdict, identify, load_problem
 from shoal.identification.recording.measurement import Recording
 from shoal.identification.recording.source import Channel, FileSource
-from shoal.identification.spread import prediction
-from shoal.identification.spread.covariance import Noise
-from shoal.identification.spread.stated_error import stated
-from shoal.identification.spread.uncertainty import Linearisation
+from shoal.identification.uncertainty import prediction
+from shoal.identification.uncertainty.covariance import Noise
+from shoal.identification.uncertainty.linearisation import Linearisation
+from shoal.identification.uncertainty.prediction_error import stated
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
 CHANNELS = (Channel(marker="B", quantity="x", column="x"), Channel(marker="B", quantity="y", column="y"))

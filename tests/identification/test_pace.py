@@ -8,8 +8,8 @@ import yaml
 from scipy.optimize import brentq
 from shoal.engines import get_engine
 from shoal.identification import Problem, identify, measure
+from shoal.identification.adapt import paced
 from shoal.identification.forward import ForwardModel
-from shoal.identification.pace import paced
 from shoal.trajectory import Array
 
 LENGTH, HEIGHT, WIDTH, DENSITY = 1.0, 0.01, 0.02, 2700.0

@@ -19,9 +19,9 @@ from shoal.engines import get_engine
 from shoal.engines.poses import initial_poses
 from shoal.errors import InputError
 from shoal.identification import Problem, identify, measure
-from shoal.identification.recording.felt import asking, equipped, from_start
 from shoal.identification.recording.observation import Camera, observe
 from shoal.identification.recording.source import Channel
+from shoal.identification.recording.virtual_sensors import engine_options, from_start, with_sensor_markers
 from shoal.mechanics.start.start import complete
 from shoal.scene import Scene
 from shoal.trajectory import Array
@@ -56,7 +56,7 @@ def seen(
 ) -> Array:
     """What the channels show of a motion, (samples, channels)."""
     instants = from_start(times, channels)
-    motion = get_engine(engine).simulate(equipped(scene, channels), instants)
+    motion = get_engine(engine).simulate(with_sensor_markers(scene, channels), instants)
     assert motion.ok
     return observe(motion, channels, view or Camera(), scene)[0, len(instants) - len(times) :]
 
@@ -114,14 +114,14 @@ def test_lanes_that_differ_in_a_table_feel_what_each_feels_alone(flexible: bool)
         scene = scene.with_values({"markers.imu.point.1": 0.0, **cable})
     channels = (IMU[0], Channel(joint="O", quantity="fx"))
     values = {"loads.push.torque.table.1.1": np.array([1.0, 2.0])}
-    instants, here = from_start(times, channels), equipped(scene, channels)
-    options = asking(get_engine("gauss"), scene, channels)
+    instants, here = from_start(times, channels), with_sensor_markers(scene, channels)
+    options = engine_options(get_engine("gauss"), scene, channels)
     motion = get_engine("gauss").simulate_many(here, values, instants, **options)
     assert motion.ok, motion.message
     found = observe(motion, channels, Camera(), scene, values)[:, 1:]
     for lane, height in enumerate(values["loads.push.torque.table.1.1"].tolist()):
         one = scene.with_values({"loads.push.torque.table.1.1": height})
-        alone = get_engine("gauss").simulate(equipped(one, channels), instants, **options)
+        alone = get_engine("gauss").simulate(with_sensor_markers(one, channels), instants, **options)
         np.testing.assert_allclose(found[lane], observe(alone, channels, Camera(), one)[0, 1:], rtol=1e-12)
     assert np.max(np.abs(found[0] - found[1])) > 1e-3
 
@@ -136,7 +136,7 @@ def test_mounting_turns_an_imu_further_and_biases_are_added() -> None:
 
 def test_sensors_that_are_mounted_otherwise_share_a_motion() -> None:
     angles = np.array([0.0, 0.1, -0.2])
-    motion = get_engine("gauss").simulate(equipped(pendulum(), IMU), from_start(TIMES, IMU))
+    motion = get_engine("gauss").simulate(with_sensor_markers(pendulum(), IMU), from_start(TIMES, IMU))
     found = observe(motion, IMU, Camera(mounting=angles, bias_ay=0.1 * angles), pendulum())[:, 1:]
     for one, angle in zip(found, angles.tolist(), strict=True):
         wanted = specific_force(*swing(), TILT + angle) + np.array([0.0, 0.1 * angle])
@@ -147,7 +147,7 @@ def test_a_strain_gauge_beside_a_camera_shows_the_same_to_lanes_that_share_a_mot
     """A time limit makes two such lanes ready before its clock begins."""
     channels = (Channel(marker="gauge", quantity="strain"), Channel(marker="tip", quantity="y"))
     scene, heights = cantilever(), np.array([0.0, 0.1])
-    motion = get_engine("gauss").simulate(equipped(scene, channels), np.array([0.0, 2e-3]))
+    motion = get_engine("gauss").simulate(with_sensor_markers(scene, channels), np.array([0.0, 2e-3]))
     found = observe(motion, channels, Camera(y=heights), scene)
     alone = np.concatenate([observe(motion, channels, Camera(y=y), scene) for y in heights.tolist()])
     np.testing.assert_array_equal(found, alone)

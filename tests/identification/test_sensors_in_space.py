@@ -13,9 +13,9 @@ from shoal.engines.exudyn.build import library, silence
 from shoal.engines.exudyn.engine import ExudynEngine
 from shoal.engines.exudyn.record import choose_steps
 from shoal.engines.exudyn.space.bodies import SolidPart
-from shoal.identification.recording.felt import asking, equipped, from_start
 from shoal.identification.recording.observation import STRAIGHT, Camera, observe
 from shoal.identification.recording.source import Channel
+from shoal.identification.recording.virtual_sensors import engine_options, from_start, with_sensor_markers
 from shoal.mechanics.analysis.reactions import reactions
 from shoal.scene import Scene
 from shoal.trajectory import Array
@@ -31,7 +31,7 @@ TIMES = np.arange(1, 11) / 20
 def seen(scene: Scene, channels: tuple[Channel, ...], times: Array = TIMES, view: Camera = STRAIGHT) -> Array:
     """What channels show, (samples, channels)."""
     engine, wanted = get_engine("gauss"), from_start(times, channels)
-    motion = engine.simulate(equipped(scene, channels), wanted, **asking(engine, scene, channels))
+    motion = engine.simulate(with_sensor_markers(scene, channels), wanted, **engine_options(engine, scene, channels))
     assert motion.ok, motion.message
     return np.asarray(observe(motion, channels, view, scene)[0, len(wanted) - len(times) :])
 
@@ -188,7 +188,9 @@ def test_the_motor_of_a_hinge_works_against_the_resistance_of_its_lane(law: str,
     channels = (Channel(joint="D", quantity="torque"), Channel(joint="J", quantity="mx"))
     engine, wanted, sizes = get_engine("gauss"), from_start(TIMES, channels), np.array([0.05, 0.2])[:lanes]
     values = {f"joints.J.{law}": sizes}
-    motion = engine.simulate_many(equipped(scene, channels), values, wanted, **asking(engine, scene, channels))
+    motion = engine.simulate_many(
+        with_sensor_markers(scene, channels), values, wanted, **engine_options(engine, scene, channels)
+    )
     found = observe(motion, channels, STRAIGHT, scene, values)[:, len(wanted) - len(TIMES) :]
     against = sizes * {"friction": 2.0, "drag": 4.0, "coulomb": 1.0}[law]
     np.testing.assert_allclose(found[..., 0], np.broadcast_to(against[:, None], found.shape[:2]), atol=1e-9)

@@ -9,12 +9,12 @@ import pytest
 from scipy.integrate import solve_ivp
 from shoal.engines import get_engine
 from shoal.identification import Estimate, Measurement, Problem, Verdict
-from shoal.identification.conclude import NOTHING, conclude
+from shoal.identification.conclude import conclude
 from shoal.identification.deadline import TimeIsUp
 from shoal.identification.diagnostics.suspects import search
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods import get_method
-from shoal.identification.recording.noise import differences
+from shoal.identification.recording.measurement import differences
 from shoal.scene import Scene
 from shoal.trajectory import Array
 
@@ -71,7 +71,7 @@ def identified(names: list[str], seed: int, tilt: float = 0.0, spring: float = 0
                                                             np.array([NOISE[name] for name in names])))  # fmt: skip
     model = ForwardModel(problem, scene, get_engine("gauss"), measurement)
     outcome = get_method("least-squares")(model, np.random.default_rng(seed), lambda *_: None)
-    return conclude(model, outcome, "least-squares", seed, 0.0, [], NOTHING)
+    return conclude(model, outcome, "least-squares", seed)
 
 
 CAMERA_AND_IMU, ENCODER_AND_IMU = ["x", "y", "ax", "ay", "rate"], ["ax", "ay", "rate", "angle"]

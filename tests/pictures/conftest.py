@@ -12,7 +12,7 @@ import pytest
 from shoal.engines import get_engine
 from shoal.engines.verification import verified
 from shoal.identification import Estimate, Measurement, Problem, identify, load_problem, measure
-from shoal.identification.conclude import Wishes
+from shoal.identification.conclude import Options
 from shoal.pictures.answer import Answer
 from shoal.pictures.report import report
 from shoal.pictures.simulation import simulation
@@ -114,7 +114,7 @@ def several() -> Answer:
     values = high.values.copy()
     values[20:30, 0] = np.nan
     gappy = Measurement({**measured.recordings, "high": replace(high, values=values)}, measured.truth)
-    return Answer(problem, identify(problem, method="least-squares", measurement=gappy, wishes=Wishes(sample=100)))
+    return Answer(problem, identify(problem, method="least-squares", measurement=gappy, options=Options(sample=100)))
 
 
 @pytest.fixture(scope="session")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from shoal.identification.conclude import Wishes
+from shoal.identification.conclude import Options
 from shoal.identification.design import design
 from shoal.identification.identify import identify
 from shoal.identification.problem import Problem
@@ -145,7 +145,7 @@ def test_correlations_are_those_of_a_jacobian(several: Answer) -> None:
 
 
 def test_profiles_are_drawn_where_wished_for(flexible: Answer) -> None:
-    estimate = identify(flexible.problem, measurement=flexible.estimate.measurement, wishes=Wishes(profiles=True))
+    estimate = identify(flexible.problem, measurement=flexible.estimate.measurement, options=Options(profiles=True))
     figure = profiles(estimate, flexible.problem)
     assert [axes.get_xlabel() for axes in figure.axes] == ["theta1 [rad]", "theta2 [rad]"]
     assert "bound every parameter" in figure.get_suptitle()

@@ -13,7 +13,7 @@ from shoal.cli import main
 from shoal.engines import get_engine
 from shoal.errors import InputError
 from shoal.identification import Estimate, Problem, identify
-from shoal.identification.conclude import Wishes
+from shoal.identification.conclude import Options
 from shoal.notebook import uncertain
 from shoal.pictures import files
 from shoal.response.inputs import Inputs
@@ -98,7 +98,7 @@ def test_the_spread_of_draws_is_that_of_their_motions(tmp_path: Path) -> None:
     """Mean and deviation of the machine run at 4000 of the draws themselves, their correlation as it is."""
     pytest.importorskip("emcee")
     pytest.importorskip("xarray")
-    estimate = identify(problem(), method="least-squares", wishes=Wishes(sample=400))
+    estimate = identify(problem(), method="least-squares", options=Options(sample=400))
     files.estimate(estimate, problem(), tmp_path / "draws.nc")
     assert estimate.posterior is not None
     some = estimate.posterior.flat[:: max(1, len(estimate.posterior.flat) // 4000), :3]

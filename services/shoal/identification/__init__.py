@@ -7,7 +7,7 @@ from shoal.identification.measure import measure
 from shoal.identification.methods import METHODS
 from shoal.identification.problem import Problem, load_problem, problem_names
 from shoal.identification.recording.measurement import Measurement, Recording
-from shoal.identification.spread.value import Value
+from shoal.identification.uncertainty.intervals import Value
 
 __all__ = [
     "METHODS",

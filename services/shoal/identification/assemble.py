@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -19,13 +20,13 @@ from shoal.identification.evidence import Evidence
 from shoal.identification.findings import Verdict
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods.outcome import Outcome
-from shoal.identification.spread import intervals
-from shoal.identification.spread.bootstrap import bootstrap
-from shoal.identification.spread.posterior import Posterior, differences, posterior
-from shoal.identification.spread.prediction import Prediction, predictions
-from shoal.identification.spread.uncertainty import autocorrelation
-from shoal.identification.spread.value import Value
 from shoal.identification.surroundings import Surroundings
+from shoal.identification.uncertainty import intervals
+from shoal.identification.uncertainty.bootstrap import bootstrap
+from shoal.identification.uncertainty.intervals import Value
+from shoal.identification.uncertainty.linearisation import autocorrelation
+from shoal.identification.uncertainty.posterior import Posterior, differences, posterior
+from shoal.identification.uncertainty.prediction import Prediction, predictions
 from shoal.scene import Rod, Scene
 from shoal.trajectory import Array
 
@@ -39,7 +40,7 @@ def assemble(
     near: Evidence,
     known: Surroundings,
     judgement: Judgement,
-    stages: list[AdaptedModel],
+    stages: Sequence[AdaptedModel],
     *,
     method: str,
     seed: int,
@@ -54,7 +55,7 @@ def assemble(
     """
     point, at, measurement = near.point, near.at, model.measurement
     values = intervals.with_refits(model, known.values, judgement.refits)
-    foretold: list[Prediction] = unless_late(
+    predicted: list[Prediction] = unless_late(
         lambda: predictions(
             model, point, near.seen if near.known else None, near.beside, near.blocks, near.error, near.fields
         ),
@@ -73,13 +74,13 @@ def assemble(
         engine=model.engine.name,
         seed=seed,
         findings=[
-            *_findings(model, outcome, near, known, judgement, values, foretold, meshed=not stages),
+            *_findings(model, outcome, near, known, judgement, values, predicted, meshed=not stages),
             *draws,
-            *(one.finding(named=len(measurement.recordings) > 1) for one in foretold),
+            *(one.finding(named=len(measurement.recordings) > 1) for one in predicted),
         ],
         choice=outcome.choice,
-        parameters={name: value.told() for name, value in values.items()},
-        quantities={name: value.told() for name, value in known.quantities(model, near, judgement).items()},
+        parameters={name: value.reported() for name, value in values.items()},
+        quantities={name: value.reported() for name, value in known.quantities(model, near, judgement).items()},
         combinations=known.combinations,
         fitness=outcome.fitness,
         rms=float(np.sqrt(outcome.fitness / model.rows.things)),
@@ -90,7 +91,7 @@ def assemble(
         history=searched.counter.history,
         iterations=outcome.iterations,
         minima=[
-            {**model.parameters.told(p), "fitness": f}
+            {**model.parameters.by_name(p), "fitness": f}
             for p, f in sorted(known.outcome.minima, key=lambda end: end[1])
             if np.isfinite(f)
         ],
@@ -116,7 +117,7 @@ def assemble(
         covariance=covariance,
         values=carried,
         left_out=left,
-        prediction=foretold,
+        prediction=predicted,
         joint=joint(model.parameters, point, covariance, values),
     )
 
@@ -128,14 +129,14 @@ def _findings(
     known: Surroundings,
     judgement: Judgement,
     values: dict[str, Value],
-    foretold: list[Prediction],
+    predicted: list[Prediction],
     *,
     meshed: bool,
 ) -> list[Finding]:
     """Return what was found out about an answer, the decisive first. meshed: whether the scene states its mesh."""
     given = [one for one in (*near.given, near.fields) if one is not None]
     return [
-        *_refuted(judgement, foretold),
+        *_refuted(judgement, predicted),
         *(judgement.findings or _ended(outcome)),
         *outcome.findings,
         *(_beside(model, near, known, values) if judgement.verdict.trusted else []),
@@ -153,9 +154,9 @@ def _findings(
     ]
 
 
-def _refuted(judgement: Judgement, foretold: list[Prediction]) -> list[Finding]:
+def _refuted(judgement: Judgement, predicted: list[Prediction]) -> list[Finding]:
     """Return whether windows that were held out refute an answer that would be trusted."""
-    worst = max((one for one in foretold if one.refutes), key=lambda one: one.ratio, default=None)
+    worst = max((one for one in predicted if one.refutes), key=lambda one: one.ratio, default=None)
     if worst is None or not judgement.verdict.trusted:
         return []
     text = f"held-out data refute the model: predicted {worst.ratio:.2g} times worse than the estimate states"

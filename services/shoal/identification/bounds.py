@@ -1,4 +1,4 @@
-"""Whether a scene may have a value, and up to where, for the bounds of parameters."""
+"""Values that a scene accepts: limits of fields are intervals, so between two accepted values all are accepted."""
 
 from __future__ import annotations
 
@@ -43,3 +43,22 @@ def possible_bound(
     inwards = np.ceil if bound < inside else np.floor
     nearest = float(f"{inwards(inside / digit) * digit:.3g}")
     return nearest if accepts(scene, fields(nearest)) else None
+
+
+class Accepted:
+    """Cache of the intervals of values that a scene accepts, by path; the scene is asked for what lies beyond."""
+
+    def __init__(self, scene: Scene, known: Mapping[str, tuple[float, float]]) -> None:
+        """known: intervals by path that it accepted when it was loaded."""
+        self._scene = scene
+        self._known = dict(known)
+
+    def __call__(self, path: str, value: float) -> bool:
+        """Return whether the scene accepts a value at a path."""
+        least, most = self._known.get(path, (np.inf, -np.inf))
+        if least <= value <= most:
+            return True
+        accepted = accepts(self._scene, {path: value})
+        if accepted:
+            self._known[path] = min(value, least), max(value, most)
+        return accepted

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from shoal.identification.estimate import Estimate
     from shoal.identification.parametrization import Parametrization
     from shoal.identification.problem import Problem
-    from shoal.identification.spread.value import Value
+    from shoal.identification.uncertainty.intervals import Value
     from shoal.scene import Scene
     from shoal.trajectory import Array
 
@@ -175,7 +175,7 @@ def joint(parameters: Parametrization, point: Array, covariance: Array, values: 
     kept = [k for k, name in enumerate(parameters.names) if name not in left]
     ties = {path: text for path, text in problem.ties.items() if path not in left}
     entries = list(parameters.entries.values())
-    told: dict[str, Any] = {
+    described: dict[str, Any] = {
         parameters.names[k]: {
             "path": entries[k].parameter.path,
             "value": float(parameters.to_values(point)[k]),
@@ -186,7 +186,7 @@ def joint(parameters: Parametrization, point: Array, covariance: Array, values: 
     }
     used = set().union(*(expression.names(text) for text in ties.values())) if ties else set()
     return {
-        "parameters": told,
+        "parameters": described,
         "covariance": covariance[np.ix_(kept, kept)].tolist(),
         "ties": ties,
         "constants": {name: float(x) for name, x in parameters.constants.items() if name in used},
@@ -196,13 +196,13 @@ def joint(parameters: Parametrization, point: Array, covariance: Array, values: 
 def of_estimate(estimate: Estimate) -> Carried:
     """What an estimate carries."""
     known = {name: value.value for name, value in estimate.parameters.items()}
-    told = checked_joint(estimate.joint, "values", estimate.problem)
+    parts = checked_joint(estimate.joint, "values", estimate.problem)
     return Carried(
         estimate.values,
         known,
         estimate.left_out,
-        _uncertainties(told),
-        _unknown(told),
+        _uncertainties(parts),
+        _unknown(parts),
         f"estimate of {estimate.problem}",
         estimate.verdict.trusted,
     )
@@ -236,9 +236,9 @@ def read_values(path: Path | str) -> Carried:
     }
     numbers = {str(name): float(number) for name, number in values.items()}
     reasons = {str(name): str(why) for name, why in left.items()}
-    told = checked_joint(data["joint"], "values", path) if "joint" in data else _NOTHING
+    parts = checked_joint(data["joint"], "values", path) if "joint" in data else _NOTHING
     trusted = data.get("status") == "ok"
-    return Carried(numbers, known, reasons, _uncertainties(told), _unknown(told), path.name, trusted)
+    return Carried(numbers, known, reasons, _uncertainties(parts), _unknown(parts), path.name, trusted)
 
 
 def _is_number(value: Any) -> bool:

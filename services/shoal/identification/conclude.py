@@ -5,6 +5,7 @@ Where a diagnostic meets a better minimum the search goes on from it, and a find
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,8 +24,8 @@ from shoal.identification.lengthening import lengthened
 from shoal.identification.methods.growth import FRACTAL, LARGE, growth
 from shoal.identification.methods.lanes import Descent, descend_many, descend_on
 from shoal.identification.methods.outcome import Outcome
-from shoal.identification.spread.profiles import Profile
 from shoal.identification.surroundings import Surroundings, surroundings
+from shoal.identification.uncertainty.profiles import Profile
 
 _LOWER = 1e-6
 """Of the fitness: an answer that is better by more is another one."""
@@ -33,11 +34,11 @@ _ROUNDS = 2
 
 
 @dataclass(frozen=True)
-class Wishes:
-    """What a user wants to know beyond the answer.
+class Options:
+    """Results that are computed in addition to the answer.
 
-    profiles: whether every parameter gets its profile likelihood; bootstrap: how many draws; sample: how many effective
-    draws from the posterior
+    profiles: whether every parameter gets its profile likelihood; bootstrap: number of draws; sample: number of
+    effective draws from the posterior
     """
 
     profiles: bool = False
@@ -45,17 +46,17 @@ class Wishes:
     sample: int = 0
 
 
-NOTHING = Wishes()
+DEFAULTS = Options()
 
 
 def conclude(
     model: ForwardModel,
     outcome: Outcome,
     method: str,
-    seed: int,
-    wall: float,
-    stages: list[AdaptedModel],
-    wishes: Wishes,
+    seed: int = 0,
+    wall: float = 0.0,
+    stages: Sequence[AdaptedModel] = (),
+    options: Options = DEFAULTS,
     rounds: int = _ROUNDS,
 ) -> Estimate:
     """Return the estimate of an outcome. The runs it takes are not counted: no method is charged for them.
@@ -66,14 +67,14 @@ def conclude(
     if model.deadline is not None:
         model.deadline.extend()
     outcome, near = _at_minimum(model, outcome)
-    known = surroundings(model, outcome, near, wishes.profiles)
+    known = surroundings(model, outcome, near, options.profiles)
     judgement = _judged(model, near, known)
     better = _better(model, outcome, known, judgement) if rounds > 0 else None
     if better is not None:
-        return conclude(searched, _followed(outcome, better), method, seed, wall, stages, wishes, rounds - 1)
+        return conclude(searched, _followed(outcome, better), method, seed, wall, stages, options, rounds - 1)
     return assemble(
         searched, model, outcome, near, known, judgement, stages,
-        method=method, seed=seed, wall_s=wall, resamples=wishes.bootstrap, sample=wishes.sample,
+        method=method, seed=seed, wall_s=wall, resamples=options.bootstrap, sample=options.sample,
     )  # fmt: skip
 
 

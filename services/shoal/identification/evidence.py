@@ -11,12 +11,11 @@ from shoal.identification.deadline import unless_late
 from shoal.identification.diagnostics.hypotheses import ScoreTest
 from shoal.identification.diagnostics.residual_tests import ResidualTests, residual_tests
 from shoal.identification.forward import ForwardModel
-from shoal.identification.spread.covariance import Block, blocks_of
-from shoal.identification.spread.given import Given
-from shoal.identification.spread.model_error import Corrections, ModelError, model_error, rms_of
-from shoal.identification.spread.sensitivity import Sensitivity, believed
-from shoal.identification.spread.taken_as_given import taken_as_given
-from shoal.identification.spread.uncertainty import Linearisation, followed, linearise
+from shoal.identification.uncertainty.covariance import Block, blocks_of
+from shoal.identification.uncertainty.linearisation import Linearisation, followed, linearise
+from shoal.identification.uncertainty.model_error import Corrections, ModelError, model_error, rms_of
+from shoal.identification.uncertainty.sensitivity import Sensitivity, believed
+from shoal.identification.uncertainty.uncertain_inputs import Given, taken_as_given
 from shoal.trajectory import Array
 
 
@@ -54,7 +53,7 @@ class Evidence:
 
     @property
     def known(self) -> bool:
-        """Return whether intervals can be told."""
+        """Return whether intervals can be estimated."""
         return self.possible and self.looked
 
     def score_test(self, model: ForwardModel) -> ScoreTest:
@@ -101,12 +100,12 @@ def evidence(model: ForwardModel, point: Array) -> Evidence:
     tests = ResidualTests.not_made(model)
     if tested:
         tests = residual_tests(model, seen.residual, blocks, at.noise, limit, refined, chosen)
-    told = float(np.sqrt(np.sum(np.any(seen.jacobian != 0.0, axis=1))))
-    at = replace(at, systematic=tests.excess * told)
+    independent = float(np.sqrt(np.sum(np.any(seen.jacobian != 0.0, axis=1))))
+    at = replace(at, systematic=tests.excess * independent)
     beside = reduce(lambda so_far, one: one.spread(so_far), given, at)
     at = beside if fields is None else fields.spread(beside)
-    told_of = point, predicted, residual, seen, looked is not None, possible, blocks, beside, at, error
-    return Evidence(*told_of, *parts, tests, given, fields)
+    parts_found = point, predicted, residual, seen, looked is not None, possible, blocks, beside, at, error
+    return Evidence(*parts_found, *parts, tests, given, fields)
 
 
 def _size(model: ForwardModel, rows: Array | None) -> float | None:

@@ -15,18 +15,17 @@ import numpy.typing as npt
 from shoal.engines import get_engine
 from shoal.engines.contract import Engine
 from shoal.errors import InputError
-from shoal.identification.accepted import Accepted
-from shoal.identification.bounds import accepts
+from shoal.identification.bounds import Accepted, accepts
 from shoal.identification.deadline import Deadline, TimeIsUp
 from shoal.identification.loss import flatten, steepness
 from shoal.identification.parametrization import Parametrization
 from shoal.identification.placement import AngleSensitivity, placement
 from shoal.identification.problem import Problem
 from shoal.identification.recording.clocks import by_clock
-from shoal.identification.recording.felt import asking, equipped, from_start
 from shoal.identification.recording.measurement import Measurement, Recording
 from shoal.identification.recording.observation import Camera, observe, without_turns
 from shoal.identification.recording.rows import ResidualRows
+from shoal.identification.recording.virtual_sensors import engine_options, from_start, with_sensor_markers
 from shoal.mechanics.numerics.tile import WIDE
 from shoal.memory import Memory
 from shoal.scene import Scene
@@ -71,7 +70,7 @@ class ForwardModel:
     """Why a simulation was refused, if one was."""
     failure: str = field(init=False, default="")
     """Why a simulation failed, if one did."""
-    reached: tuple[float, float, Array] = field(init=False, default=(0.0, np.inf, np.empty(0)))
+    longest_fit: tuple[float, float, Array] = field(init=False, default=(0.0, np.inf, np.empty(0)))
     """Of the longest part of the recordings that was fitted: its end [s], the best fitness on it, and the point."""
 
     _placements: dict[str, AngleSensitivity] = field(init=False, default_factory=dict)
@@ -185,8 +184,8 @@ class ForwardModel:
         channels = self.measurement.recordings[name].channels
         instants = from_start(times, channels)
         try:
-            options = asking(self.engine, scene, channels)
-            trajectory = self._run(equipped(scene, channels), values, instants, lanes, options)
+            options = engine_options(self.engine, scene, channels)
+            trajectory = self._run(with_sensor_markers(scene, channels), values, instants, lanes, options)
             seen = observe(trajectory, channels, view, scene, values)
         except InputError as error:
             asked = self.whole or self
@@ -247,7 +246,7 @@ class ForwardModel:
         channels = recordings[name].channels
         if (known := self._placement(points, name)) is not None:
             return known(points)
-        shown = [not channel.is_felt for channel in channels]
+        shown = [not channel.is_sensor for channel in channels]
         found = np.full((len(points), len(channels)), np.nan)
         if any(shown):
             found[:, shown] = self._native.observe(points, name, np.zeros(1))[:, 0]
@@ -329,7 +328,8 @@ class ForwardModel:
 
     @cached_property
     def _accepted(self) -> Accepted:
-        return Accepted(self.scene, [entry.parameter for entry in self.parameters.entries.values()])
+        known = [entry.parameter for entry in self.parameters.entries.values()]
+        return Accepted(self.scene, {one.path: (one.lower, one.upper) for one in known if one.path is not None})
 
     def _residuals(self, points: Array) -> Array:
         found = self._remembered(points) if self.memory is not None else self._evaluated(points)
@@ -341,9 +341,9 @@ class ForwardModel:
             whole.counter.charge(len(points), points[0], np.inf)
             values = self.cost(found)
             best = int(np.argmin(values))
-            reached = (-self.measurement.end, values[best]) < (-whole.reached[0], whole.reached[1])
-            if reached and np.isfinite(values[best]):
-                whole.reached = (self.measurement.end, float(values[best]), points[best].copy())
+            longer = (-self.measurement.end, values[best]) < (-whole.longest_fit[0], whole.longest_fit[1])
+            if longer and np.isfinite(values[best]):
+                whole.longest_fit = (self.measurement.end, float(values[best]), points[best].copy())
         return found
 
     def _remembered(self, points: Array) -> Array:
@@ -410,7 +410,7 @@ class ForwardModel:
 
 def _not_felt(recording: Recording) -> Recording:
     """Without the channels that sensors feel."""
-    shown = [k for k, channel in enumerate(recording.channels) if not channel.is_felt]
+    shown = [k for k, channel in enumerate(recording.channels) if not channel.is_sensor]
     channels = tuple(recording.channels[k] for k in shown)
     return replace(recording, channels=channels, values=recording.values[:, shown], noise=recording.noise[shown])
 

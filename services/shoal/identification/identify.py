@@ -17,7 +17,7 @@ from shoal.compile import clock
 from shoal.engines import get_engine
 from shoal.errors import InputError
 from shoal.identification.carried import Carried
-from shoal.identification.conclude import NOTHING, Wishes, conclude
+from shoal.identification.conclude import DEFAULTS, Options, conclude
 from shoal.identification.deadline import Deadline, TimeIsUp, unless_late
 from shoal.identification.estimate import Estimate
 from shoal.identification.forward import ForwardModel
@@ -28,7 +28,7 @@ from shoal.identification.recording.measurement import Measurement
 from shoal.identification.recording.plausible import check_constant
 from shoal.identification.recording.source import EngineSource
 from shoal.identification.run_method import Watch, assembled, run_method, with_step
-from shoal.identification.spread.posterior import require_sampler
+from shoal.identification.uncertainty.posterior import require_sampler
 from shoal.memory import Memory
 from shoal.versions import versions
 
@@ -50,7 +50,7 @@ def identify(
     tolerance: float | None = None,
     time_limit: float | None = None,
     checkpoint: Path | None = None,
-    wishes: Wishes = NOTHING,
+    options: Options = DEFAULTS,
     progress: Watch = lambda *_: None,
 ) -> Estimate:
     """Find the parameters of a problem.
@@ -63,16 +63,16 @@ def identify(
     hold_out: windows that are predicted instead of fitted (see `measure`);
     time_limit [s]: of everything but data that are computed and kernels that are compiled; then the best so far is the
     answer; checkpoint: file of evaluations, which a run that was broken off finds when it is started again;
-    wishes: what is to be known beyond the answer;
-    progress: is told how the search goes. Raises InputError, ComputationError.
+    options: results that are computed in addition to the answer;
+    progress: called with the state of the search. Raises InputError, ComputationError.
     """
     begun_at, counted_from = time.monotonic(), clock.now()
-    check(seed=seed, tolerance=tolerance, time_limit=time_limit, bootstrap=wishes.bootstrap, sample=wishes.sample)
+    check(seed=seed, tolerance=tolerance, time_limit=time_limit, bootstrap=options.bootstrap, sample=options.sample)
     name = method or problem.method
     search = get_method(name)
     if tolerance is not None and engine != "gauss":
         raise InputError(f"tolerance: models are chosen for engine gauss only, found engine {engine!r}")
-    if wishes.sample:
+    if options.sample:
         require_sampler()
     notes: list[str] = []
     if fitted is not None:
@@ -100,7 +100,7 @@ def identify(
         begin = clock.now()
         model, outcome, stages = run_method(model, search, np.random.default_rng(seed), tolerance, paces, progress)
         wall = clock.now() - begin
-        estimate = _concluded(model, outcome, name, seed, wall, stages, wishes)
+        estimate = _concluded(model, outcome, name, seed, wall, stages, options)
     compiled = time.monotonic() - begun_at - (clock.now() - counted_from)
     if deadline is not None and compiled >= _WORTH_A_NOTE:
         notes.append(f"compiling kernels took {compiled:.0f} s, which the limit of {deadline.limit:g} s does not count")

@@ -12,7 +12,7 @@ import numpy as np
 
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods.lanes import Descent, damped_step, squares
-from shoal.identification.spread.sensitivity import sensitivity
+from shoal.identification.uncertainty.sensitivity import sensitivity
 from shoal.trajectory import Array
 
 _SHORTER = 0.75

@@ -14,13 +14,12 @@ from shoal.engines import get_engine
 from shoal.errors import ComputationError, InputError
 from shoal.identification.problem import RESERVED, Problem
 from shoal.identification.recording.computed import kept
-from shoal.identification.recording.felt import asking, equipped, from_start
 from shoal.identification.recording.measurement import Measurement, Recording
 from shoal.identification.recording.observation import camera, observe, without_turns
-from shoal.identification.recording.plausible import check_units
+from shoal.identification.recording.plausible import check_repeated, check_units
 from shoal.identification.recording.reading import described, sampled
-from shoal.identification.recording.repeated import check_repeated
 from shoal.identification.recording.source import Channel, Clocked, EngineSource, FileSource
+from shoal.identification.recording.virtual_sensors import engine_options, from_start, with_sensor_markers
 from shoal.scene import Scene
 from shoal.scene.load import unknown
 from shoal.scene.record import one_line
@@ -122,7 +121,9 @@ def _computed(problem: Problem, source: EngineSource, scene: Scene, where: str) 
     def simulated() -> Array:
         wanted = from_start(instants, channels)
         engine = get_engine(source.engine)
-        trajectory = engine.simulate(equipped(truth, channels), wanted, **asking(engine, truth, channels))
+        trajectory = engine.simulate(
+            with_sensor_markers(truth, channels), wanted, **engine_options(engine, truth, channels)
+        )
         if not trajectory.ok:
             raise ComputationError(f"{where}: the data could not be computed: {trajectory.message}")
         seen = without_turns(observe(trajectory, channels, camera(source), truth), channels)

@@ -125,7 +125,7 @@ class Parametrization:
         """Parameters in their own units of components, (..., components)."""
         return np.where(self.logarithmic, np.exp(np.where(self.logarithmic, points, 0.0)), points)
 
-    def told(self, point: Array) -> dict[str, float]:
+    def by_name(self, point: Array) -> dict[str, float]:
         """Parameters by name, in their own units, at a point (components,)."""
         return dict(zip(self.names, self.to_values(point).tolist(), strict=True))
 

@@ -15,8 +15,8 @@ from pydantic import BeforeValidator, Field, ValidationError, model_validator
 from shoal.arguments import told
 from shoal.errors import InputError
 from shoal.identification.bounds import accepts, possible_bound
-from shoal.identification.recording.sensor_checks import check_felt
 from shoal.identification.recording.source import IN_SPACE, Channel, EngineSource, FileSource, Source
+from shoal.identification.recording.virtual_sensors import check_sensors
 from shoal.scene import Scene, expression, load_scene
 from shoal.scene.joints import Gear
 from shoal.scene.load import names, read_named
@@ -274,9 +274,9 @@ class Problem(Record):
                     scene.with_values(fields(bound))
                 except InputError as error:
                     nearest = possible_bound(scene, path, bound, fields)
-                    told = "" if nearest is None else f"; with the rest of {scene.name} as it is {nearest:g} can be"
+                    possible = "" if nearest is None else f"; with the rest of {scene.name} as it is {nearest:g} can be"
                     where = f"{self.name}: parameters.{name}.{end}"
-                    raise InputError(f"{where}: {bound:g} cannot be: {error}{told}") from None
+                    raise InputError(f"{where}: {bound:g} cannot be: {error}{possible}") from None
 
     def _fields(self, scene: Scene, name: str, value: float) -> dict[str, float]:
         """What a value of a parameter sets in the scene, by path, with its ties; the others are at their starts."""
@@ -307,7 +307,7 @@ class Problem(Record):
                     f"{where}: noise: a prior weighs against the data by their noise; state it for {channel.place}"
                 )
         try:
-            check_felt(scene, channels)
+            check_sensors(scene, channels)
         except InputError as error:
             raise InputError(f"{where}: {error}") from None
 

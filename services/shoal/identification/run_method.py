@@ -9,13 +9,12 @@ import numpy as np
 
 from shoal.engines import get_engine
 from shoal.errors import InputError
-from shoal.identification.adapt import AdaptedModel, Stopped, coarse_to_fine
+from shoal.identification.adapt import AdaptedModel, Stopped, coarse_to_fine, paced, repaced
 from shoal.identification.deadline import TimeIsUp, unless_late
 from shoal.identification.diagnostics.minima.search import with_other_minima
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods import Method, Outcome
 from shoal.identification.methods.starts import starting_points
-from shoal.identification.pace import paced, repaced
 from shoal.trajectory import Array
 
 Watch = Callable[[int, float, float, int], None]
@@ -106,12 +105,12 @@ def _best_so_far(model: ForwardModel) -> Outcome:
     assert deadline is not None
     deadline.extend()
     best, fitness = counter.best, counter.best_value
-    end, _, reached = model.reached
+    end, _, point = model.longest_fit
     message = f"stopped after {deadline.limit:g} s, before the method had ended"
     if end > 0.0:
-        there = unless_late(lambda: float(model.cost(model.uncounted(reached[None]))[0]), np.inf)
+        there = unless_late(lambda: float(model.cost(model.uncounted(point[None]))[0]), np.inf)
         if there < fitness:
-            best, fitness, message = reached, there, f"{message}: fitted on the first {end:.3g} s"
+            best, fitness, message = point, there, f"{message}: fitted on the first {end:.3g} s"
     if not np.isfinite(fitness):
         start = unless_late(lambda: starting_points(model)[:1], model.parameters.start[None])
         fitness = unless_late(lambda: float(model.fitness(start)[0]), np.inf)

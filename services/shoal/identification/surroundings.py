@@ -14,11 +14,10 @@ from shoal.identification.evidence import Evidence
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods.growth import FRACTAL, growth
 from shoal.identification.methods.outcome import Outcome
-from shoal.identification.spread import intervals
-from shoal.identification.spread.curvature import bent, by_profile
-from shoal.identification.spread.profiles import Profile, profiles
-from shoal.identification.spread.rank import combinations
-from shoal.identification.spread.value import Value
+from shoal.identification.uncertainty import intervals
+from shoal.identification.uncertainty.intervals import Value
+from shoal.identification.uncertainty.profiles import Profile, bent, by_profile, profiles
+from shoal.identification.uncertainty.rank import combinations
 from shoal.trajectory import Array
 
 

@@ -10,9 +10,9 @@ import numpy as np
 from shoal.engines import get_engine
 from shoal.identification import Estimate, Problem
 from shoal.identification.forward import ForwardModel
-from shoal.identification.spread.covariance import blocks_of
-from shoal.identification.spread.sensitivity import believed
-from shoal.identification.spread.uncertainty import Linearisation, linearise
+from shoal.identification.uncertainty.covariance import blocks_of
+from shoal.identification.uncertainty.linearisation import Linearisation, linearise
+from shoal.identification.uncertainty.sensitivity import believed
 from shoal.trajectory import Array
 
 

@@ -165,7 +165,7 @@ def motion(answer: Answer, recording: str, frames: int = _FRAMES) -> DrawnMotion
     close = np.abs(samples.times[nearest] - times) <= 1.01 * max(times[1] - times[0], _step(samples.times))
     places: dict[str, dict[str, Array]] = {}
     for k, channel in enumerate(samples.channels):
-        if channel.to is not None or channel.is_felt:
+        if channel.to is not None or channel.is_sensor:
             continue
         values = np.where(close, samples.values[nearest, k], np.nan)
         places.setdefault(channel.marker, {})[channel.quantity] = values

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from shoal.identification import Estimate
 from shoal.identification.recording.units import of_channel
-from shoal.identification.spread.prediction import Prediction
+from shoal.identification.uncertainty.prediction import Prediction
 from shoal.pictures.numbers import handy
 from shoal.pictures.style import BLACK, ORANGE, VERMILION, canvas, headline, styled
 

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from shoal.identification import Estimate, Problem
-from shoal.identification.spread.profiles import Profile
+from shoal.identification.uncertainty.profiles import Profile
 from shoal.pictures import units
 from shoal.pictures.style import BLACK, BLUE, ORANGE, VERMILION, canvas, headline, styled
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from shoal.findings import sentence
 from shoal.identification import Estimate
-from shoal.identification.spread.value import Value
+from shoal.identification.uncertainty.intervals import Value
 from shoal.pictures import units
 from shoal.pictures.answer import Answer
 from shoal.pictures.drawn import Drawn

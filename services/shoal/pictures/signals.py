@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shoal.identification import Estimate
-from shoal.identification.recording.noise import noise_of
+from shoal.identification.recording.measurement import noise_of
 from shoal.identification.recording.source import Channel
 from shoal.identification.recording.units import of_channel
 from shoal.trajectory import Array

@@ -19,7 +19,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 from shoal.identification import Estimate, Measurement, Problem, Verdict, identify
 from shoal.identification.diagnostics.hypotheses import ScoreTest, independent, table
-from shoal.identification.spread.covariance import Block, estimate_noise
+from shoal.identification.uncertainty.covariance import Block, estimate_noise
 
 Array = Any
 _SHOWS = 80.0

@@ -11,11 +11,11 @@ import pytest
 from scipy.integrate import solve_ivp
 from shoal.engines import get_engine
 from shoal.identification import Estimate, Measurement, Problem
-from shoal.identification.conclude import NOTHING, conclude
+from shoal.identification.conclude import conclude
 from shoal.identification.diagnostics.other_laws import OtherLaw, wider_by_other_laws
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods import get_method
-from shoal.identification.spread.value import Value
+from shoal.identification.uncertainty.intervals import Value
 from shoal.scene import Scene
 
 LENGTH, MASS, VISCOUS, START = 0.8, 0.5, 0.02, -0.7
@@ -56,7 +56,7 @@ def identified(law: str, noise: float, seed: int, share: float = 1.0, *more: str
     measurement = Measurement.single(times, tuple(problem.channels), seen[:, None], "scipy")
     model = ForwardModel(problem, scene, get_engine("gauss"), measurement)
     outcome = get_method("least-squares")(model, np.random.default_rng(seed), lambda *_: None)
-    return conclude(model, outcome, "least-squares", seed, 0.0, [], NOTHING)
+    return conclude(model, outcome, "least-squares", seed)
 
 
 @pytest.mark.parametrize("draws", [[1], pytest.param(range(2, 15), marks=pytest.mark.slow)], ids=["one", "many"])

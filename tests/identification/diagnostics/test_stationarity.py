@@ -7,15 +7,15 @@ import pytest
 from scipy.signal import lfilter
 from shoal.engines import get_engine
 from shoal.identification import Measurement, Problem, Verdict
-from shoal.identification.conclude import NOTHING, conclude
+from shoal.identification.conclude import conclude
 from shoal.identification.diagnostics.stationarity import downhill
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods import Outcome
 from shoal.identification.methods.lanes import Descent
 from shoal.identification.methods.least_squares import descend
-from shoal.identification.spread.covariance import blocks_of
-from shoal.identification.spread.sensitivity import believed
-from shoal.identification.spread.uncertainty import linearise
+from shoal.identification.uncertainty.covariance import blocks_of
+from shoal.identification.uncertainty.linearisation import linearise
+from shoal.identification.uncertainty.sensitivity import believed
 from shoal.trajectory import Array
 
 SOLVER = {"solver.integrator": "rk4", "solver.step": 5e-3}
@@ -132,7 +132,7 @@ def test_the_verdict_says_so_and_names_the_way_down() -> None:
     ends = {Verdict.IDENTIFIED: end.point, Verdict.UNFINISHED: beside(model, end, 10.0, np.random.default_rng(1))}
     for verdict, point in ends.items():
         outcome = Outcome(point, float(model.fitness(point[None])[0]), [], "")
-        estimate = conclude(model, outcome, "afsa", 0, 0.0, [], NOTHING)
+        estimate = conclude(model, outcome, "afsa", 0)
         assert estimate.verdict is verdict, estimate.message
     assert estimate.status == "failed"
     assert estimate.codes[0] == "not-stationary"
@@ -143,7 +143,7 @@ def test_the_verdict_says_so_and_names_the_way_down() -> None:
 def test_an_end_outside_the_bounds_is_no_answer() -> None:
     model, start = drawn(0)
     outside = np.array([start[0], model.upper[1] + 0.1])
-    estimate = conclude(model, Outcome(outside, 1.0, [], ""), "iafsa-printed", 0, 0.0, [], NOTHING)
+    estimate = conclude(model, Outcome(outside, 1.0, [], ""), "iafsa-printed", 0)
     assert estimate.verdict is Verdict.UNFINISHED
     assert estimate.codes == ["out-of-bounds"]
     assert "theta2" in estimate.message

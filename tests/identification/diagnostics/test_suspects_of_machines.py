@@ -8,12 +8,10 @@ import pytest
 from shoal.engines import get_engine
 from shoal.identification import Measurement, Problem
 from shoal.identification.diagnostics.suspects import Suspect, suspects
-from shoal.identification.diagnostics.suspects.candidate import FaultHypothesis
-from shoal.identification.diagnostics.suspects.fits import Together, groups_of
-from shoal.identification.diagnostics.suspects.of_measurement import of_measurement
+from shoal.identification.diagnostics.suspects.candidate import FaultHypothesis, Together, groups_of, size_of
+from shoal.identification.diagnostics.suspects.of_recordings import of_measurement
 from shoal.identification.diagnostics.suspects.of_samples import stretches
-from shoal.identification.diagnostics.suspects.shaken import shaken
-from shoal.identification.diagnostics.suspects.size import size_of
+from shoal.identification.diagnostics.suspects.other_mechanisms import shaken
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods.least_squares import descend, differentiate, least_squares
 from shoal.identification.recording.observation import observe

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from shoal.engines import get_engine
 from shoal.identification import Estimate, Measurement, Problem, Verdict, identify, load_problem, measure
-from shoal.identification.conclude import NOTHING, conclude
+from shoal.identification.conclude import conclude
 from shoal.identification.diagnostics.judgement import Judgement, judge
 from shoal.identification.findings import BETTER_MINIMUM
 from shoal.identification.forward import ForwardModel
@@ -183,7 +183,7 @@ def test_exchanged_markers_are_rejected() -> None:
 
 
 def concluded(model: ForwardModel, outcome: Outcome) -> Estimate:
-    return conclude(model, outcome, "test", 0, 0.0, [], NOTHING)
+    return conclude(model, outcome, "test", 0)
 
 
 def model_of(stated: Problem) -> ForwardModel:

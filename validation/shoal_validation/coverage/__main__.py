@@ -16,8 +16,8 @@ import numpy as np
 from rich.console import Console
 from rich.progress import track
 from shoal.identification.methods.least_squares import descend
-from shoal.identification.spread.covariance import blocks_of
-from shoal.identification.spread.uncertainty import linearise, spread
+from shoal.identification.uncertainty.covariance import blocks_of
+from shoal.identification.uncertainty.linearisation import linearise, spread
 from shoal.trajectory import Array
 
 from shoal_validation.coverage.cases import Case, cases

@@ -16,9 +16,9 @@ from pathlib import Path
 
 import numpy as np
 from shoal.identification.methods.least_squares import descend
-from shoal.identification.spread.covariance import blocks_of
-from shoal.identification.spread.posterior import Posterior, posterior
-from shoal.identification.spread.uncertainty import linearise
+from shoal.identification.uncertainty.covariance import blocks_of
+from shoal.identification.uncertainty.linearisation import linearise
+from shoal.identification.uncertainty.posterior import Posterior, posterior
 
 from shoal_validation.coverage.cases import Case, cases
 from shoal_validation.document import publish, table

@@ -21,7 +21,7 @@ import yaml
 from shoal.errors import ShoalError
 from shoal.identification import Measurement, Problem, identify
 from shoal.identification.estimate import Estimate
-from shoal.identification.spread.value import Value
+from shoal.identification.uncertainty.intervals import Value
 
 from shoal_validation.coverage.exudyn_imu import imu
 from shoal_validation.coverage.sensed_machines import Machine, machine

@@ -19,12 +19,12 @@ from shoal.identification import Measurement, Problem
 from shoal.identification.diagnostics.residual_tests import residual_tests
 from shoal.identification.diagnostics.suspects.candidate import with_parameters
 from shoal.identification.diagnostics.suspects.of_machine import of_machine
-from shoal.identification.diagnostics.suspects.of_measurement import of_measurement
+from shoal.identification.diagnostics.suspects.of_recordings import of_measurement
 from shoal.identification.forward import ForwardModel
 from shoal.identification.recording.observation import observe
-from shoal.identification.spread.covariance import blocks_of
-from shoal.identification.spread.sensitivity import sensitivity
-from shoal.identification.spread.uncertainty import linearise, spread
+from shoal.identification.uncertainty.covariance import blocks_of
+from shoal.identification.uncertainty.linearisation import linearise, spread
+from shoal.identification.uncertainty.sensitivity import sensitivity
 from shoal.scene import Scene
 from shoal.trajectory import Array
 

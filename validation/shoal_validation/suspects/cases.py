@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from shoal.engines import get_engine
 from shoal.identification import Measurement, Problem
-from shoal.identification.diagnostics.suspects.size import Size, size_of
+from shoal.identification.diagnostics.suspects.candidate import Size, size_of
 from shoal.identification.recording.observation import STRAIGHT, Camera, observe
 from shoal.scene import Scene
 from shoal.trajectory import Array

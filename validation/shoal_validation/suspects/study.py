@@ -10,7 +10,7 @@ import numpy as np
 from scipy.special import betaincinv
 from shoal.engines import get_engine
 from shoal.identification import Verdict
-from shoal.identification.conclude import NOTHING, conclude
+from shoal.identification.conclude import conclude
 from shoal.identification.diagnostics.suspects import Suspect
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods import get_method
@@ -66,7 +66,7 @@ def trial(seed: int, kind: str | None = None) -> Trial:
     drawn = case(seed, kind)
     model = ForwardModel(drawn.problem, drawn.scene, get_engine("gauss"), drawn.measurement)
     outcome = get_method("least-squares")(model, np.random.default_rng(seed), lambda *_: None)
-    estimate = conclude(model, outcome, "least-squares", seed, 0.0, [], NOTHING)
+    estimate = conclude(model, outcome, "least-squares", seed)
     known = {name: estimate.parameters[name] for name in drawn.truth}
     held = [not value.identifiable or value.lower <= drawn.truth[name] <= value.upper for name, value in known.items()]
     tests = estimate.residual_tests

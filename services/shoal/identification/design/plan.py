@@ -24,8 +24,8 @@ from shoal.identification.measure import measure
 from shoal.identification.problem import Problem
 from shoal.identification.recording.measurement import Measurement, Recording
 from shoal.identification.recording.source import Channel, EngineSource
-from shoal.identification.spread.sensitivity import sensitivity
-from shoal.identification.spread.taken_as_given import taken_as_given
+from shoal.identification.uncertainty.sensitivity import sensitivity
+from shoal.identification.uncertainty.uncertain_inputs import taken_as_given
 from shoal.scene import Scene
 from shoal.trajectory import Array, plain
 
@@ -83,21 +83,21 @@ class Design:
         return not self.message
 
     def to_json(self) -> dict[str, Any]:
-        """The object that `shoal design --json` prints; null where nothing is told."""
+        """The object that `shoal design --json` prints; null where nothing is known."""
 
-        def told(precision: Precision) -> dict[str, Any]:
+        def described(precision: Precision) -> dict[str, Any]:
             std = dict(zip(self.aim.names, precision.std.tolist(), strict=True))
             return {"std": std, "a": precision.a, "d": precision.d, "unknown": precision.unknown}
 
         def rows(found: list[tuple[Sensor, Precision]]) -> list[dict[str, Any]]:
-            return [sensor.to_json() | told(precision) for sensor, precision in found]
+            return [sensor.to_json() | described(precision) for sensor, precision in found]
 
         stated = ("message", "problem", "values", "duration", "rate")
         noise: dict[str, Any] = {"noise": self.noise.get(POSITION), "angle_noise": self.noise.get(ANGLE)}
         noise["sensor_noise"] = {kind: size for kind, size in self.noise.items() if kind in SENSORS}
         return plain(  # type: ignore[no-any-return]
             {"status": "ok" if self.ok else "failed", **{name: getattr(self, name) for name in stated}, **noise}
-            | {"weakest": self.aim.weakest(self.now)[0], "parameter": self.aim.parameter, "now": told(self.now)}
+            | {"weakest": self.aim.weakest(self.now)[0], "parameter": self.aim.parameter, "now": described(self.now)}
             | {"ranked": rows(self.ranked), "second": rows(self.second), "durations": self.durations}
             | {"rates": self.rates, "table": self.table, "doubt": self.doubt}
             | {"given": self.given}
@@ -157,7 +157,7 @@ def design(
     return Design(
         problem=problem.name,
         aim=aim,
-        values=model.parameters.told(point),
+        values=model.parameters.by_name(point),
         noise=sizes,
         duration=duration,
         rate=rate,
@@ -226,7 +226,7 @@ def _possible(problem: Problem, scene: Scene, sensors: list[Sensor], at: Mapping
 def _model(problem: Problem, scene: Scene, channels: tuple[Channel, ...], noise: Array, times: Array) -> ForwardModel:
     """Of the first recording, with other channels of some noise at other times, of which nothing was measured yet."""
     name, source = next(iter(problem.sources.items()))
-    # Standard deviations are told in the parameters' own units, but for those that are stated to be logarithms.
+    # Standard deviations are given in the parameters' own units, but for those that are stated to be logarithms.
     scales = {n: p.model_copy(update={"scale": "linear"}) for n, p in problem.parameters.items() if p.scale == "auto"}
     changes = {"loss": "squares", "recordings": {name: source} if problem.recordings else {}}
     changes["parameters"] = {**problem.parameters, **scales}

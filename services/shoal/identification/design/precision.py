@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shoal.identification.spread.uncertainty import told
+from shoal.identification.uncertainty.linearisation import determined
 from shoal.trajectory import Array
 
 
@@ -15,7 +15,7 @@ from shoal.trajectory import Array
 class Precision:
     """What a measurement would tell: standard deviation of each parameter (of its logarithm where that is sought).
 
-    std: inf where nothing is told, (parameters,); the others relative to the ranges between the bounds
+    std: inf where nothing is known, (parameters,); the others relative to the ranges between the bounds
     a: root of the mean variance; d: geometric mean over the axes of the ellipsoid; unknown: directions left open
     """
 
@@ -86,7 +86,7 @@ def precision(jacobian: Array, span: Array, error: Array | None = None, moved: A
     count = len(span)
     rows = np.concatenate([jacobian * span, np.zeros((count, count))])
     _, singular, right = np.linalg.svd(np.linalg.qr(rows, mode="r"))
-    known = told(singular, right, None if error is None else error * span)
+    known = determined(singular, right, None if error is None else error * span)
     inverse = np.where(known, 1.0 / np.where(known, singular, 1.0), 0.0)
     # Along the axes of what the noise leaves open.
     axes = inverse[:, None] * right

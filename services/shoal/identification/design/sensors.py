@@ -11,8 +11,8 @@ import numpy as np
 from shoal.errors import InputError
 from shoal.identification.design.asked import ANGLE
 from shoal.identification.design.precision import Bundle
-from shoal.identification.recording.sensor_checks import has_axes, takes_gauges
 from shoal.identification.recording.source import ACCELERATIONS, FORCES, MOMENTS, RATES, Channel, Quantity
+from shoal.identification.recording.virtual_sensors import has_axes, takes_gauges
 from shoal.scene import Scene
 from shoal.scene.bodies import Rod
 from shoal.scene.joints import Revolute

@@ -20,11 +20,10 @@ from shoal.identification.forward import ForwardModel
 from shoal.identification.methods.growth import LARGE, growth
 from shoal.identification.methods.lanes import Descent
 from shoal.identification.methods.outcome import Outcome
-from shoal.identification.spread.covariance import blocks_of
-from shoal.identification.spread.intervals import Refit, few, with_refits
-from shoal.identification.spread.sensitivity import Sensitivity
-from shoal.identification.spread.uncertainty import Linearisation, linearise
-from shoal.identification.spread.value import Value
+from shoal.identification.uncertainty.covariance import blocks_of
+from shoal.identification.uncertainty.intervals import Refit, Value, few, with_refits
+from shoal.identification.uncertainty.linearisation import Linearisation, linearise
+from shoal.identification.uncertainty.sensitivity import Sensitivity
 from shoal.trajectory import Array
 
 _DECISIVE = 5.0

@@ -12,16 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from shoal.findings import Finding
-from shoal.identification.diagnostics.suspects.candidate import FaultHypothesis
-from shoal.identification.diagnostics.suspects.fits import Together
+from shoal.identification.diagnostics.suspects.candidate import FaultHypothesis, Together, size_of
 from shoal.identification.diagnostics.suspects.of_machine import RESISTING, resisting
-from shoal.identification.diagnostics.suspects.size import size_of
 from shoal.identification.findings import OTHER_LAW
 from shoal.identification.forward import ForwardModel
-from shoal.identification.spread.covariance import blocks_of
-from shoal.identification.spread.sensitivity import Sensitivity
-from shoal.identification.spread.uncertainty import inverse, linearise, spread
-from shoal.identification.spread.value import Value
+from shoal.identification.uncertainty.covariance import blocks_of
+from shoal.identification.uncertainty.intervals import Value
+from shoal.identification.uncertainty.linearisation import inverse, linearise, spread
+from shoal.identification.uncertainty.sensitivity import Sensitivity
 from shoal.scene.joints import Resisted
 from shoal.trajectory import Array
 

@@ -8,8 +8,8 @@ from shoal.engines.verification import SMALLER
 from shoal.findings import Finding
 from shoal.identification import findings as kinds
 from shoal.identification.diagnostics.residual_tests import ResidualTests
-from shoal.identification.spread.profiles import Profile
-from shoal.identification.spread.value import Value
+from shoal.identification.uncertainty.intervals import Value
+from shoal.identification.uncertainty.profiles import Profile
 
 _NOTICED = 0.1
 """Of half an interval: a contribution to it that is worth a word."""

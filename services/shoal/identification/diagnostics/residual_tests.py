@@ -11,8 +11,8 @@ import numpy.typing as npt
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods.outcome import GROSS, NOISES
 from shoal.identification.recording.units import of_channels
-from shoal.identification.spread.chances import above_chi_square
-from shoal.identification.spread.covariance import DOUBT, Block, Noise
+from shoal.identification.uncertainty.chances import above_chi_square
+from shoal.identification.uncertainty.covariance import DOUBT, Block, Noise
 from shoal.trajectory import Array, plain
 
 _LOUD = 1.5
@@ -30,7 +30,7 @@ _SEVERAL = 3.0
 _UNRESOLVED = 0.05
 """Of the signal: motion that its fourth differences show as a noise above this has less than eight samples a period."""
 _LAGS = 16
-"""Earlier samples that foretell one, at most a fifth of all: so many foretell eight lines of a spectrum."""
+"""Order of the linear prediction, at most a fifth of the samples: two coefficients for each of eight spectral lines."""
 _FAR = 3
 """Samples later they do: noise is alike so far apart by no differences, such as those that make a rate of angles."""
 OUTLIER = 5.0
@@ -116,7 +116,7 @@ class ResidualTests:
 
     @property
     def limited(self) -> bool:
-        """Return whether the model, and not the noise, limits what the fit tells."""
+        """Return whether the model, and not the noise, limits the accuracy of the fit."""
         return self.systematic or self.excess > 0.0
 
     @property
@@ -169,8 +169,8 @@ class ResidualTests:
 
     def to_json(self) -> dict[str, Any]:
         """All fields, and what follows from them; null where there was nothing to test."""
-        told = {"ratio": self.ratio, "systematic": self.systematic, "wrong_model": self.wrong_model}
-        found: dict[str, Any] = plain({**asdict(self), **told})
+        derived = {"ratio": self.ratio, "systematic": self.systematic, "wrong_model": self.wrong_model}
+        found: dict[str, Any] = plain({**asdict(self), **derived})
         return found if self.made else dict.fromkeys(found)
 
 

@@ -2,7 +2,7 @@
 
 Least squares end where the step vanishes; a swarm ends when its iterations are used up, wherever it is then. What
 remains to go is measured by the uncertainty that the answer would have at the minimum: an end within it is as good as
-the minimum, for the data cannot tell them apart.
+the minimum, for the data do not distinguish them.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from shoal.identification.forward import ForwardModel
-from shoal.identification.spread.covariance import blocks_of
-from shoal.identification.spread.sensitivity import Sensitivity
-from shoal.identification.spread.uncertainty import linearise, told
+from shoal.identification.uncertainty.covariance import blocks_of
+from shoal.identification.uncertainty.linearisation import determined, linearise
+from shoal.identification.uncertainty.sensitivity import Sensitivity
 from shoal.trajectory import Array
 
 _FAR = 2.0
@@ -76,10 +76,10 @@ def sentence(model: ForwardModel, point: Array, better: Downhill) -> str:
 
 
 def _step(model: ForwardModel, point: Array, seen: Sensitivity) -> Array:
-    """Gauss-Newton step within the bounds, of least norm among those that the data do not tell apart, (parameters,)."""
+    """Gauss-Newton step within the bounds, of least norm where the data leave it open, (parameters,)."""
     sizes, steeper = model.sizes(point), model.steepness(seen.residual)
     left, singular, right = np.linalg.svd(steeper[:, None] * seen.jacobian * sizes, full_matrices=False)
-    known = told(singular, right, steeper[:, None] * seen.error * sizes)
+    known = determined(singular, right, steeper[:, None] * seen.error * sizes)
     if not np.any(known):
         return np.zeros(len(point))
     low, high = model.box_at(point)
@@ -95,7 +95,7 @@ def _step(model: ForwardModel, point: Array, seen: Sensitivity) -> Array:
 
 
 def _distance(model: ForwardModel, point: Array, place: Array, seen: Sensitivity, residual: Array) -> float:
-    """Between a point and a better place, in standard deviations (Mahalanobis), in the directions that the data tell.
+    """Mahalanobis distance to a better place, in the directions that the data determine.
 
     seen: derivatives; residual: at the better place; what the parameters could still take away there is no noise
     """
@@ -103,7 +103,7 @@ def _distance(model: ForwardModel, point: Array, place: Array, seen: Sensitivity
     basis = np.linalg.qr(seen.jacobian)[0]
     at = linearise(seen.jacobian, residual - basis @ (basis.T @ residual), sizes, blocks, seen.error)
     values, directions = np.linalg.eigh(at.covariance / np.outer(sizes, sizes))
-    told = slice(at.unknown.shape[1], None)
+    kept = slice(at.unknown.shape[1], None)
     along = directions.T @ ((place - point) / sizes)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return float(np.sqrt(np.nansum(along[told] ** 2 / np.maximum(values[told], 0.0))))
+        return float(np.sqrt(np.nansum(along[kept] ** 2 / np.maximum(values[kept], 0.0))))

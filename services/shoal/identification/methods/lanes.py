@@ -15,7 +15,6 @@ from typing import TypeVar
 import numpy as np
 
 from shoal.identification.forward import ForwardModel, Progress
-from shoal.identification.methods.attitudes import nearest_attitudes
 from shoal.mechanics.integrators import facts
 from shoal.mechanics.numerics.tile import WIDE
 from shoal.trajectory import Array
@@ -93,7 +92,7 @@ def descend_on(model: ForwardModel, end: Descent) -> Descent:
 
 
 Differentiate = Callable[[Sequence[int], Sequence[Array]], tuple[Sequence[Array], Sequence[Array]]]
-"""Residuals and Jacobians at points of some of several models, which are told by their numbers."""
+"""Residuals and Jacobians at points of some of several models, which are given by their numbers."""
 
 
 def descend_each(
@@ -191,7 +190,7 @@ def best_apart(model: ForwardModel, points: Array, values: Array, count: int) ->
 
 
 class SearchHistory(list[tuple[int, float, float]]):
-    """Rows of (iteration, best, mean fitness), one for each population of a search; `progress` is told of each."""
+    """Rows of (iteration, best, mean fitness), one for each population of a search; `progress` is called with each."""
 
     def __init__(self, progress: Progress) -> None:
         super().__init__()
@@ -358,3 +357,25 @@ def differing(model: ForwardModel, one: Array, other: Array) -> Array:
     size = np.clip(10 * np.maximum(np.abs(one), np.abs(other)), 1e-3 * span, span)
     scale = np.where(turning, np.minimum(span, 2 * np.pi), np.where(model.parameters.logarithmic, span, size))
     return np.asarray(np.where(turning, turned, difference) > ENDS_APART * scale)
+
+
+_ALIKE = 1e-9
+"""Of a rotation vector [rad]: what turns may change of its components that are not sought."""
+
+
+def nearest_attitudes(model: ForwardModel, point: Array, other: Array) -> Array:
+    """A point (parameters,) with its rotation vectors, of those of the same attitudes, nearest to those of another."""
+    found = point.copy()
+    for (recording, body), components in model.parameters.rotations.items():
+        stated = model.scene.initial[body].rotation or (0.0, 0.0, 0.0)
+        known = {} if recording is None else model.measurement.recordings[recording].stated.known
+        base = np.array([known.get(f"initial.{body}.rotation.{k}", part) for k, part in enumerate(stated)])
+        sought, numbers = list(components), list(components.values())
+        vector, near = base.copy(), base.copy()
+        vector[sought], near[sought] = point[numbers], other[numbers]
+        angle = float(np.linalg.norm(vector))
+        turns = np.round((vector @ near / angle - angle) / (2 * np.pi)) if angle > 0.0 else 0.0
+        turned = vector * (1.0 + 2 * np.pi * turns / angle) if turns else vector
+        if np.all(np.abs(np.delete(turned - vector, sought)) <= _ALIKE):
+            found[numbers] = turned[sought]
+    return found

@@ -269,7 +269,7 @@ def _state_paths(scene: Scene) -> list[str]:
 
 
 def _check(model: ForwardModel) -> None:
-    """Raise InputError, with the reason, where segments cannot be told from their state or do not fit the record."""
+    """Raise InputError, with the reason, where segments do not follow from their state or do not fit the record."""
     scene, instead = model.scene, "use progressive"
     paths = [*model.parameters.paths, *model.problem.ties]
     joints = list(scene.joints.values())

@@ -120,5 +120,5 @@ def _reach(model: ForwardModel, branch: Branch, horizon: float) -> float:
     allowed = max(_PREDICTED * model.rows.signal, _NOTICED * float(np.sqrt(branch.fitness)))
     off = part.rows.time[np.abs(residual) > allowed]
     off = off[off > horizon]
-    reached = float(np.min(off)) if off.size else part.measurement.end
-    return min(max(reached, _LEAST * horizon), model.measurement.end)
+    worst = float(np.min(off)) if off.size else part.measurement.end
+    return min(max(worst, _LEAST * horizon), model.measurement.end)

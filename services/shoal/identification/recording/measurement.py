@@ -11,8 +11,8 @@ from shoal.errors import InputError
 from shoal.identification.recording.source import Channel, Clocked
 from shoal.trajectory import Array
 
-_FEWEST = 3
-"""Samples, without which there is no motion."""
+FEWEST = 3
+"""Samples without which there is no motion: two show no acceleration."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class Recording:
             held.append(HeldOut(window, self.times[inside], self.values[inside]))
             fitted &= ~inside
         left = np.isfinite(self.values[fitted]).sum(axis=0)
-        if not np.all(left) or np.count_nonzero(fitted) < _FEWEST:
+        if not np.all(left) or np.count_nonzero(fitted) < FEWEST:
             raise InputError(f"hold_out: {np.count_nonzero(fitted)} samples are left to fit; hold out less")
         count = len(self.times) - np.count_nonzero(fitted)
         origin = f"{self.origin}, {count} of them held out" if held else self.origin
@@ -140,3 +140,33 @@ class Measurement:
     def changed(self, change: Callable[[Recording], Recording]) -> Measurement:
         """With a change of every recording."""
         return replace(self, recordings={name: change(recording) for name, recording in self.recordings.items()})
+
+
+_ORDER = 4
+_QUARTILE = 0.6744897501960817
+"""Median absolute deviation of a normal distribution over its standard deviation."""
+
+
+def noise_of(recording: Recording) -> Array:
+    """Standard deviation of the noise of each channel, (channels,): as stated, else by differences of the data.
+
+    A smooth motion has small fourth differences, white noise has large ones: their median tells its size, and outliers
+    do not change it. Motion that the sampling does not resolve counts as noise.
+    """
+    estimated = np.array([differences(recording.values[:, k]) for k in range(len(recording.channels))])
+    return np.where(np.isfinite(recording.noise), recording.noise, estimated)
+
+
+def differences(signal: Array) -> float:
+    """Standard deviation of white noise on a smooth signal, from the median of its fourth differences.
+
+    At least that of rounding, which a signal that moves by less than its last digit between samples does not show.
+    """
+    known = signal[np.isfinite(signal)]
+    if len(known) < _ORDER + 2:
+        return float("nan")
+    jumps = np.diff(known, _ORDER)
+    # Of white noise of variance one: the sum of the squared binomial coefficients 1 4 6 4 1.
+    size = float(np.median(np.abs(jumps)) / _QUARTILE / np.sqrt(70.0))
+    digit = float(np.diff(np.unique(known)).min(initial=np.inf)) if np.ptp(known) else 0.0
+    return max(size, digit / float(np.sqrt(12.0)), 1e-12 * float(np.ptp(known)), 1e-300)

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from shoal.errors import InputError
-from shoal.identification.recording.felt import felt
 from shoal.identification.recording.source import Channel, Clocked
+from shoal.identification.recording.virtual_sensors import sensor_channels
 from shoal.scene import Scene
 from shoal.trajectory import Array, Trajectory
 
@@ -64,11 +64,11 @@ def observe(
     """The channels of a trajectory, (lanes, samples, channels). Raises InputError if its engine tells no rates.
 
     scene, values by path, one for each lane: of the machine, which sensors of acceleration, force and strain need; the
-    trajectory is then that of the scene with their markers, see `felt.equipped`
+    trajectory is then that of the scene with their markers, see `virtual_sensors.with_sensor_markers`
     """
     columns = []
     c, s = np.cos(seen_by.tilt), np.sin(seen_by.tilt)
-    sensed = felt(trajectory, channels, scene, values or {}, seen_by.mounting)
+    sensed = sensor_channels(trajectory, channels, scene, values or {}, seen_by.mounting)
     for number, channel in enumerate(channels):
         if number in sensed:
             bias = getattr(seen_by, f"bias_{channel.quantity}", 0.0)

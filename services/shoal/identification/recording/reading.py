@@ -10,11 +10,10 @@ import numpy as np
 from pydantic import ValidationError
 
 from shoal.errors import InputError
-from shoal.identification.recording.measurement import Recording
-from shoal.identification.recording.noise import differences
+from shoal.identification.recording.measurement import FEWEST, Recording, differences
 from shoal.identification.recording.source import Channel, FileSource, units_of
 from shoal.identification.recording.swaps import mend
-from shoal.identification.recording.unit_line import with_units
+from shoal.identification.recording.units import with_units
 from shoal.scene.load import read_yaml
 from shoal.scene.record import one_line
 from shoal.table import ColumnTable, Mask, load_table
@@ -26,8 +25,6 @@ MOST = 20_000
 """Samples of a recording that are fitted; of more every n-th is taken, with a note."""
 _ABOUT = 0.1
 """Of a recording: where its times begin within that part after zero, zero is meant."""
-_FEWEST = 3
-"""Samples, without which there is no motion."""
 _OUTLIER = 8.0
 """Times the noise; an isolated sample farther off is counted as an outlier."""
 _PAUSE = 1.5
@@ -122,7 +119,7 @@ def sampled(source: FileSource, channels: tuple[Channel, ...]) -> tuple[Recordin
 def _times(source: FileSource, table: ColumnTable) -> Array:
     """Times [s], (rows,), as recorded or counted. Raises InputError."""
     if len(table.rows) == 0:
-        raise InputError(f"{table.path}: only 0 samples in the file; at least {_FEWEST} are needed")
+        raise InputError(f"{table.path}: only 0 samples in the file; at least {FEWEST} are needed")
     if source.rate:
         return np.asarray(table.frames / source.rate)
     times = table.numbers(source.time) * source.time_scale
@@ -148,10 +145,10 @@ def _window(source: FileSource, times: Array, begin: float, path: Path) -> Mask:
     stop = np.inf if source.duration is None else begin + source.duration
     inside: Mask = (times >= begin - 1e-9) & (times <= stop + 1e-9)
     count = len(np.flatnonzero(inside)[:: source.every])
-    if count < _FEWEST:
+    if count < FEWEST:
         raise InputError(
             f"{path}: only {count} samples from {begin:g} s to {stop:g} s (every {source.every}); at least "
-            f"{_FEWEST} are needed; the recording covers {_span(times)}"
+            f"{FEWEST} are needed; the recording covers {_span(times)}"
         )
     return inside
 
@@ -161,7 +158,7 @@ def _refuse_marks(column: Array, where: str) -> None:
     known = column[np.isfinite(column)]
     for mark in (known.min(), known.max()) if known.size else ():
         rest = known[known != mark]
-        if abs(mark) not in _MARKS or len(rest) < _FEWEST:
+        if abs(mark) not in _MARKS or len(rest) < FEWEST:
             continue
         if min(abs(rest.min() - mark), abs(rest.max() - mark)) > _APART * np.ptp(rest):
             raise InputError(
@@ -197,7 +194,7 @@ def _signal(
         column, notes = _unwrapped(column, times, 2 * np.pi / unit, channel.marker, inside)
     if channel.origin:
         column = column - columns[channel.origin]
-    seen = channel.quantity != "x" and not channel.is_felt
+    seen = channel.quantity != "x" and not channel.is_sensor
     sense = -1.0 if source.y_axis == "down" and seen else 1.0
     return np.asarray(channel.offset + sense * channel.scale * unit * column), notes
 
@@ -263,8 +260,8 @@ def _held(times: Array, signal: Array) -> list[str]:
     found = []
     for k in [k for k in np.flatnonzero(lengths >= _HELD) if lengths[k] <= len(x) / 2][:1]:
         begin = ends[k] - lengths[k] + 1
-        told = f"{lengths[k]} samples in a row are all {x[begin]:.6g} from {t[begin]:g} s on"
-        found.append(f"{told}; if a marker was lost there, leave the cells empty")
+        constant = f"{lengths[k]} samples in a row are all {x[begin]:.6g} from {t[begin]:g} s on"
+        found.append(f"{constant}; if a marker was lost there, leave the cells empty")
     return found
 
 

@@ -7,8 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from shoal.identification.recording.measurement import Measurement, Recording
-from shoal.identification.recording.noise import noise_of
+from shoal.identification.recording.measurement import Measurement, Recording, noise_of
 from shoal.identification.recording.source import Channel
 from shoal.identification.recording.units import of_channels
 from shoal.trajectory import Array

@@ -143,7 +143,7 @@ class Channel(Record):
         return f"{self.place}.{self.kind}"
 
     @property
-    def is_felt(self) -> bool:
+    def is_sensor(self) -> bool:
         """Return whether a sensor on the machine shows it that knows no camera: of acceleration, force or strain."""
         return self.quantity in (*ACCELERATIONS, *RATES, *REACTIONS, STRAIN)
 

@@ -24,7 +24,7 @@ from shoal.identification.methods.progressive import extend
 from shoal.trajectory import Array
 
 _UNEVEN = 0.1
-"""Of a step between samples: from here on uneven times tell a fast swing from a slow one."""
+"""Of a step between samples: from here on uneven times distinguish a fast swing from a slow one."""
 _LOOKS = 4
 """Values between the bounds and the answer, to either side, at which the motion is looked at between the samples."""
 _UNRESOLVED = 0.3

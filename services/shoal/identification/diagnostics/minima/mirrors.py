@@ -1,4 +1,4 @@
-"""Mirror images of an answer: other starts of the machine that the measured channels may not tell apart.
+"""Mirror images of an answer: other starts of the machine that the measured channels may not distinguish.
 
 A height alone is the same for the machine reflected about the axis of gravity, a tip is the same for both elbows. From
 the answer such starts follow by reflections and half turns of its angles, in space of the machine, and by other poses

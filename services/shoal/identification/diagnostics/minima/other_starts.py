@@ -1,7 +1,7 @@
 """Other starts of a machine, by the parameters that make them: mirror images in space, and more turns between samples.
 
 An isometry W of space and one B of a body, both proper or neither, take its attitude R to W R B and its spin w to
-det(W) W w. Where B leaves the body what it is, and W gravity and what is seen, nothing tells the two apart; whether
+det(W) W w. Where B leaves the body what it is, and W gravity and what is seen, nothing distinguishes the two; whether
 they do is left to who looks at the images.
 """
 
@@ -172,7 +172,7 @@ class _ReachableStart:
         return _directions([*np.eye(3), *_principal(self.scene, body).T, *through])
 
     def _wanted(self, body: str, **vectors: Array) -> Wanted | None:
-        """What a start of a body with these vectors says; None where it is not told to the parameters that way."""
+        """What a start of a body with these vectors says; None where the parameters do not state it that way."""
         start, wanted = self.scene.initial[body], dict[str, float]()
         for quantity, vector in vectors.items():
             paths, known = [f"initial.{body}.{quantity}.{k}" for k in range(3)], getattr(start, quantity)

@@ -12,9 +12,9 @@ from shoal.identification.diagnostics.hypotheses import Hypothesis
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods.lanes import UNDAMPED, damped_step, differentiate_many, differing, kept_apart
 from shoal.identification.methods.outcome import Outcome
-from shoal.identification.spread.chances import chi_square_above
-from shoal.identification.spread.uncertainty import LEVEL, Linearisation
-from shoal.identification.spread.value import Value
+from shoal.identification.uncertainty.chances import chi_square_above
+from shoal.identification.uncertainty.intervals import Value
+from shoal.identification.uncertainty.linearisation import LEVEL, Linearisation
 from shoal.mechanics.numerics.levenberg_marquardt import levenberg_marquardt
 from shoal.mechanics.numerics.tile import Index
 from shoal.trajectory import Array
@@ -34,14 +34,14 @@ _STATIONS, _STEPS = 7, 10
 
 
 def rivals_of(model: ForwardModel, outcome: Outcome, at: Linearisation) -> list[Array]:
-    """Other minima that fit as well as the noise can tell, without repetitions, (parameters,) each."""
+    """Other minima that fit as well within the noise, without repetitions, (parameters,) each."""
     limit = as_good(model, outcome, at)
     good = [point for point, fitness in outcome.minima if fitness <= limit]
     return kept_apart([outcome.point, *good], partial(apart, model))[1:]
 
 
 def as_good(model: ForwardModel, outcome: Outcome, at: Linearisation) -> float:
-    """Up to which fitness another point explains the data as well as the answer, as far as the noise can tell."""
+    """Up to which fitness another point explains the data as well as the answer within the noise."""
     doubt = chi_square_above(len(outcome.point), 1.0 - LEVEL) * _unit(at) / model.rows.samples
     least = max(outcome.fitness, model.rows.things * (model.rows.noise or 0.0) ** 2)
     return outcome.fitness + min(doubt, 0.5 * least) + 1e-18

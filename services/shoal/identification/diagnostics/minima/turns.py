@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from shoal.identification.forward import ForwardModel
-from shoal.identification.methods.attitudes import nearest_attitudes
+from shoal.identification.methods.lanes import nearest_attitudes
 from shoal.identification.methods.outcome import Outcome
 from shoal.trajectory import Array
 

@@ -1,18 +1,58 @@
-"""What was taken as known and is freed: its numbers, the machine that has them, and how their effect is probed."""
+"""A machine by order of magnitude: what its frictions, rates and records are measured against."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
 
 from shoal.identification.forward import ForwardModel
+from shoal.identification.methods.lanes import Descent, descend_each, difference_at
+from shoal.identification.methods.least_squares import PATIENCE
 from shoal.identification.problem import Parameter
 from shoal.identification.recording.units import unit
+from shoal.mechanics.numerics.tile import WIDE
+from shoal.mechanics.reach import span
 from shoal.scene import Scene
+from shoal.scene.joints import places
 from shoal.trajectory import Array
+
+_EARTH = 9.81
+
+
+@dataclass(frozen=True)
+class Size:
+    """Mass [kg], length of its largest body and how far it reaches [m], and its gravity, that of the earth if none."""
+
+    mass: float
+    length: float
+    reach: float
+    gravity: float
+
+    @property
+    def rate(self) -> float:
+        """Of a swing [rad/s]."""
+        return float(np.sqrt(self.gravity / self.length))
+
+
+def size_of(scene: Scene) -> Size:
+    """The size of a machine."""
+    lengths = [max(float(np.linalg.norm(place)) for place in body.points.values()) for body in scene.bodies.values()]
+    ground = [
+        float(np.linalg.norm(side.point))
+        for joint in scene.joints.values()
+        for side in places(joint)
+        if side.body == "ground" and not isinstance(side.point, str)
+    ]
+    mass = sum(float(body.mass) for body in scene.bodies.values())
+    gravity = float(np.linalg.norm(scene.gravity)) or _EARTH
+    # A point on a slider has no extent; how far its start or its spring is limits how far it goes.
+    reach = sum(lengths) + max(ground, default=0.0) or span(scene)
+    return Size(mass, max([*lengths, 1e-3]), reach, gravity)
+
 
 _TINY = 1e-9
 _NEAR = 1.04
@@ -27,8 +67,8 @@ class FaultHypothesis:
         each way, and the best counts; bases: where the effects of each way vanish, (ways, numbers)
     law: how the effect grows: with a number, with its logarithm, or with one over it
     kind: of the suspect that it may become; scene: the machine that has its paths, None for the model's own
-    alone: whether no other number may be freed beside it; factor: whether its change is told as a factor
-    tell: its size and its change in words, from its numbers; None for the usual words
+    alone: whether no other number may be freed beside it; factor: whether its change is given as a factor
+    describe: its size and its change in words, from its numbers; None for the usual words
     """
 
     name: str
@@ -41,7 +81,7 @@ class FaultHypothesis:
     scene: Scene | None = None
     alone: bool = False
     factor: bool = False
-    tell: Callable[[Array], tuple[float, str]] | None = None
+    describe: Callable[[Array], tuple[float, str]] | None = None
 
     @classmethod
     def single(
@@ -104,10 +144,10 @@ class FaultHypothesis:
             return np.asarray(np.log(values / base) / np.log(probes[0] / base))
         return np.asarray(np.linalg.lstsq((probes - base).T, values - base)[0])
 
-    def told(self, values: Array) -> tuple[float, str]:
-        """The value that a suspect tells, and stated and other value in words."""
-        if self.tell is not None:
-            return self.tell(values)
+    def described(self, values: Array) -> tuple[float, str]:
+        """The value that a suspect names, and stated and other value in words."""
+        if self.describe is not None:
+            return self.describe(values)
         value, stated = float(values[0]), self.stated[0]
         if self.factor:
             return value, f"a factor of {value / stated:.4g}"
@@ -121,3 +161,66 @@ def with_parameters(model: ForwardModel, candidates: list[FaultHypothesis]) -> F
     problem = model.problem.model_copy(update={"parameters": {**model.problem.parameters, **more}})
     scene = candidates[0].scene or model.scene
     return model.aside(problem=problem, scene=scene)
+
+
+_ITERATIONS = 15
+
+
+def groups_of(candidates: Iterable[FaultHypothesis]) -> list[list[FaultHypothesis]]:
+    """Candidates of one machine that can be freed beside each other."""
+    groups = dict[int, list[FaultHypothesis]]()
+    for candidate in candidates:
+        groups.setdefault(id(candidate if candidate.alone else candidate.scene), []).append(candidate)
+    return list(groups.values())
+
+
+@dataclass(frozen=True, eq=False)
+class Together:
+    """A model with all numbers of a group of candidates, of which each point changes those of one."""
+
+    model: ForwardModel
+    group: list[FaultHypothesis]
+
+    @cached_property
+    def _union(self) -> ForwardModel:
+        return with_parameters(self.model, self.group)
+
+    @cached_property
+    def _begins(self) -> list[int]:
+        sizes = [len(candidate.parameters) for candidate in self.group]
+        return list(len(self.model.names) + np.cumsum([0, *sizes[:-1]]))
+
+    def residuals(self, numbers: Sequence[int], points: Sequence[Array]) -> Array:
+        """At points (parameters and the candidate's numbers,) of candidates by number, (points, rows). Not counted."""
+        union, known = self._union, len(self.model.names)
+        stated = np.concatenate([c.vector(np.nan_to_num(c.stated, posinf=1e300)) for c in self.group])
+        stated = np.clip(stated, union.lower[known:], union.upper[known:])
+        lanes = np.tile(np.append(np.zeros(known), stated), (len(points), 1))
+        for lane, k, point in zip(lanes, numbers, points, strict=True):
+            lane[:known] = point[:known]
+            lane[self._begins[k] : self._begins[k] + len(point) - known] = point[known:]
+        return union.uncounted(lanes)
+
+    def fit(self, numbers: Sequence[int], starts: Sequence[Array]) -> list[Descent]:
+        """Descend from a start for each of some candidates."""
+        models = [self.group[k].freed(self.model) for k in numbers]
+
+        def differentiate(chosen: Sequence[int], points: Sequence[Array]) -> tuple[list[Array], list[Array]]:
+            # A point and its neighbours stand in one tile, which has one step: see `differentiate_many`.
+            most = 1 + max(len(point) for point in points)
+            block = next((size for size in (2, 4, 8, len(WIDE)) if size >= most), most)
+            steps = [difference_at(models[k], point) for k, point in zip(chosen, points, strict=True)]
+            lanes, owners = list[Array](), list[int]()
+            for k, point, step in zip(chosen, points, steps, strict=True):
+                beside = [point, *(point + step * unit for unit in np.eye(len(point)))]
+                lanes += beside + [point] * (block - len(beside))
+                owners += [numbers[k]] * block
+            seen = self.residuals(owners, lanes).reshape(len(points), block, -1)
+            jacobians = list[Array]()
+            for found, step in zip(seen, steps, strict=True):
+                with np.errstate(invalid="ignore"):
+                    slope = ((found[1 : 1 + len(step)] - found[0]) / step[:, None]).T
+                jacobians.append(np.where(np.isfinite(slope), slope, 0.0))
+            return list(seen[:, 0]), jacobians
+
+        return descend_each(models, starts, differentiate, patience=PATIENCE, most=_ITERATIONS)

@@ -45,7 +45,7 @@ def _wider(one: Parameter, turning: bool) -> Parameter:
     return one.model_copy(update={"lower": lower, "upper": upper})
 
 
-def told(model: ForwardModel, point: Array, end: Array, k: int) -> tuple[float, float, str]:
+def describe_bound(model: ForwardModel, point: Array, end: Array, k: int) -> tuple[float, float, str]:
     """Return the bound that a parameter stood at, its value without it, and both in words."""
     path = model.parameters.paths[k]
     low, high = (model.parameters.to_values(bounds)[k] for bounds in (model.lower, model.upper))

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import suppress
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from shoal.errors import InputError
-from shoal.identification.diagnostics.suspects.candidate import FaultHypothesis
-from shoal.identification.diagnostics.suspects.size import Size, size_of
-from shoal.identification.diagnostics.suspects.springs import springs
+from shoal.identification.diagnostics.suspects.candidate import FaultHypothesis, Size, size_of
 from shoal.identification.forward import ForwardModel
 from shoal.identification.problem import Parameter
 from shoal.mechanics.start.start import is_direct
@@ -26,7 +24,7 @@ _FACTORS = 2.0
 _STEP = 1e-3
 """Of the largest value that is looked for: the change by which an effect is measured."""
 _SLIGHT = 1e-6
-"""As _STEP, of friction: its laws are so alike that the curvature of a larger change hides what tells them apart."""
+"""As _STEP, of friction: its laws are so alike that the curvature of a larger change hides what distinguishes them."""
 _SHIFT = 0.2
 """Of the size of the machine, how far off a pivot is looked for."""
 _ABOUT = 0.03
@@ -190,14 +188,14 @@ def _marker(name: str, place: tuple[float, ...], width: float, scene: Scene) -> 
     points = {point: np.array(padded(at, len(place))) for point, at in scene.bodies[body].points.items()}
     probes = (base + _STEP * width * np.eye(len(place)))[None]
 
-    def tell(values: Array) -> tuple[float, str]:
+    def describe(values: Array) -> tuple[float, str]:
         there, stated = (", ".join(f"{x:.4g}" for x in one) for one in (values, place))
         off = {point: float(np.linalg.norm(values - at)) for point, at in points.items()}
         nearest = min(off, key=lambda point: off[point])
         known = f", about that of {nearest}," if off[nearest] < _ABOUT * np.linalg.norm(values - place) else ""
         return float(np.linalg.norm(values - place)), f"a value of ({there}) m{known} instead of ({stated}) m"
 
-    return FaultHypothesis(words, "machine", numbers, place, probes, base, scene=scene, tell=tell)
+    return FaultHypothesis(words, "machine", numbers, place, probes, base, scene=scene, describe=describe)
 
 
 def _rates(scene: Scene, size: Size) -> Iterator[FaultHypothesis]:
@@ -223,3 +221,59 @@ def _spins(scene: Scene, size: Size) -> Iterator[FaultHypothesis]:
             words, path, most = f"spin of {name} about {'xyz'[axis]} at the start", f"initial.{name}.spin.{axis}", 10.0
             bounds = (rate - most * size.rate, rate + most * size.rate)
             yield FaultHypothesis.single(words, path, rate, bounds, rate + _STEP * size.rate)
+
+
+_CONSTANT = 100.0
+"""Radians: a spring at rest farther away pulls alike all along a motion."""
+_LARGEST = 10.0
+"""Times the torque of the machine's weight, for each radian."""
+
+
+def springs(scene: Scene, size: Size) -> Iterator[FaultHypothesis]:
+    """A spring in each hinge that has none: its stiffness, and its torque where both directions are the same."""
+    sprung, hinges = scene.model_dump(mode="json"), list[str]()
+    held = {
+        frozenset({load.first.body, load.second.body}) for load in scene.loads.values() if load.kind == "torsion-spring"
+    }
+    for name, joint in scene.joints.items():
+        bodies = {joint.first.body, joint.second.body} if isinstance(joint, Revolute) else set()
+        if bodies and bodies not in held and not any(isinstance(scene.bodies.get(b), PointMass) for b in bodies):
+            hinges.append(name)
+            sprung["loads"] = {**sprung.get("loads", {}), **_loads(name, sprung["joints"][name])}
+    with suppress(InputError):
+        with_springs = Scene.parse(sprung)
+        for name in hinges:
+            yield _candidate(name, size, with_springs)
+
+
+def _loads(name: str, joint: dict[str, Any]) -> dict[str, Any]:
+    """Of a hinge: a spring that is at rest where the directions of its bodies agree, and a constant torque."""
+    first, second = joint["first"], joint["second"]
+    axis = {"axis": joint["axis"]} if joint.get("axis") is not None else {}
+    # On the ground a direction does not depend on the place.
+    taken = {} if first["body"] == GROUND else {"reaction": first}
+    spring = {"kind": "torsion-spring", "first": first, "second": second, "stiffness": 0.0, "angle": 0.0, **axis}
+    return {
+        f"further-spring-{name}": spring,
+        f"further-torque-{name}": {"kind": "torque", "at": second, "torque": 0.0, **taken, **axis},
+    }
+
+
+def _candidate(name: str, size: Size, scene: Scene) -> FaultHypothesis:
+    most = _LARGEST * size.mass * size.gravity * size.length
+    numbers = (
+        Parameter(path=f"loads.further-spring-{name}.stiffness", lower=0.0, upper=most),
+        Parameter(path=f"loads.further-torque-{name}.torque", lower=-np.pi * most, upper=np.pi * most),
+    )
+    probes = np.array([[[_STEP * most, 0.0], [0.0, _STEP * most]]])
+
+    def describe(values: Array) -> tuple[float, str]:
+        stiffness, torque = values.tolist()
+        if abs(torque) >= _CONSTANT * stiffness:  # none at all is one too
+            return torque, f"a constant torque of {torque:.3g} N m"
+        return stiffness, f"a stiffness of {stiffness:.3g} N m/rad, at rest at {torque / stiffness:.3g} rad"
+
+    words = f"torsion spring in {name}"
+    return FaultHypothesis(
+        words, "machine", numbers, (0.0, 0.0), probes, np.zeros((1, 2)), scene=scene, describe=describe
+    )

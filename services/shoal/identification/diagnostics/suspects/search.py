@@ -17,25 +17,21 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from shoal.identification.deadline import TimeIsUp
-from shoal.identification.diagnostics.hypotheses import SAMPLES, Hypothesis, ScoreTest, table
-from shoal.identification.diagnostics.suspects.bending import bending
-from shoal.identification.diagnostics.suspects.candidate import FaultHypothesis
-from shoal.identification.diagnostics.suspects.fits import Together, groups_of
-from shoal.identification.diagnostics.suspects.of_bounds import at_bound, told, without_bounds
-from shoal.identification.diagnostics.suspects.of_data import Reading, misfit, of_data
+from shoal.identification.diagnostics.hypotheses import SAMPLES, Hypothesis, ScoreTest, Suspect, penalty, table
+from shoal.identification.diagnostics.suspects.candidate import FaultHypothesis, Together, groups_of
+from shoal.identification.diagnostics.suspects.of_bounds import at_bound, describe_bound, without_bounds
 from shoal.identification.diagnostics.suspects.of_machine import of_machine
-from shoal.identification.diagnostics.suspects.of_measurement import of_measurement
+from shoal.identification.diagnostics.suspects.of_recordings import Reading, misfit, of_data, of_measurement
 from shoal.identification.diagnostics.suspects.of_samples import LeftOut, recordings, stretches
-from shoal.identification.diagnostics.suspects.shaken import shaken
-from shoal.identification.diagnostics.suspects.suspect import Suspect, penalty
+from shoal.identification.diagnostics.suspects.other_mechanisms import bending, shaken
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods.lanes import Descent, descend_many
 from shoal.identification.methods.outcome import GROSS
 from shoal.identification.methods.starts import starting_points
 from shoal.identification.recording.units import of_channels
-from shoal.identification.spread.covariance import blocks_of
-from shoal.identification.spread.intervals import Refit
-from shoal.identification.spread.uncertainty import followed
+from shoal.identification.uncertainty.covariance import blocks_of
+from shoal.identification.uncertainty.intervals import Refit
+from shoal.identification.uncertainty.linearisation import followed
 from shoal.trajectory import Array
 
 _FITTED = 8
@@ -54,7 +50,7 @@ _SHARES = np.array([1.0, 0.5, 0.2, 0.05, 0.0])
 _SCAN = 11
 _UNSEEN = 1e-6
 _ALIKE = 0.999
-"""Cosine of two effects beyond what the parameters follow: from here on small faults are not told from each other."""
+"""Cosine of two effects beyond what the parameters follow: from here on small faults are not distinguished."""
 _BETTER = 0.99
 """Of the misfit: a lower one with nothing changed is that of a better minimum."""
 _PATIENCE = 10.0
@@ -124,8 +120,8 @@ def suspects(
         cut = False
     rows = len(residual)
     # Clock and gravity explain a free swing equally well: the order of equals is that of their names.
-    told = (suspect for suspect in search.found if suspect.after < _CONSTANT * model.rows.signal)
-    found = sorted(told, key=lambda s: (float(f"{s.cost(rows):.2e}"), s.name))
+    reported = (suspect for suspect in search.found if suspect.after < _CONSTANT * model.rows.signal)
+    found = sorted(reported, key=lambda s: (float(f"{s.cost(rows):.2e}"), s.name))
     listed = [suspect for suspect in found if suspect.cost(rows) <= _FAR**2 * found[0].cost(rows)]
     refits = {(s.name, s.kind): search.refits[s.name, s.kind] for s in listed if (s.name, s.kind) in search.refits}
     named = [replace(s, alike=search.alike(s.name)) for s in listed]
@@ -320,7 +316,7 @@ class _FaultSearch:
         starts = np.vstack([self.point, starting_points(wider)[:3]])
         end = min(descend_many(wider, starts, patience=_PATIENCE), key=lambda one: one.fitness)
         for k in [k for k in which if not self.model.lower[k] <= end.point[k] <= self.model.upper[k]]:
-            bound, value, change = told(self.model, self.point, end.point, k)
+            bound, value, change = describe_bound(self.model, self.point, end.point, k)
             self._test(f"bound of {self.model.names[k]}", "bounds", 0, bound, value, change, end)
 
     def _follow(self) -> None:
@@ -337,8 +333,8 @@ class _FaultSearch:
         self.ends.append((after, end.point[:known]))
         if not end.converged:
             self.unfinished.append((after, candidate, end.point))
-        value, change = candidate.told(values)
-        stated = 0.0 if candidate.tell else candidate.stated[0]
+        value, change = candidate.described(values)
+        stated = 0.0 if candidate.describe else candidate.stated[0]
         if self._test(candidate.name, candidate.kind, len(values), stated, value, change, end):
             self.refits[candidate.name, candidate.kind] = Refit(free, end.point, end.residual, end.jacobian)
 
@@ -378,18 +374,18 @@ class _FaultSearch:
         numbers: int,
         tested: tuple[float, float, float],
         tests: float,
-        told: tuple[float, float, str],
+        change: tuple[float, float, str],
         after: float,
     ) -> bool:
         """Return whether a fit explains the misfit; its row enters the table.
 
-        tested: drop, p-value and share; tests: so many hypotheses were looked at; told: stated and other value, words
+        tested: drop, p-value and share; tests: so many hypotheses were looked at; change: stated and other value, words
         """
         drop, chance, explained = tested
         row = Hypothesis(name, kind, numbers, drop, chance, min(1.0, tests * chance), explained, fitted=True)
-        stated, value, change = told
+        stated, value, words = change
         unit = of_channels(self.model.measurement)
-        suspect = Suspect(name, stated, value, self.before, after, change, unit, kind, numbers, row.corrected)
+        suspect = Suspect(name, stated, value, self.before, after, words, unit, kind, numbers, row.corrected)
         self.fits[name, kind] = suspect, row
         return row.explains
 
@@ -408,10 +404,10 @@ class _FaultSearch:
             jacobian = np.zeros((len(residual), len(one.model.names)))
             residual[~one.rows], jacobian[~one.rows] = weight * end.residual, weight[:, None] * end.jacobian
             left, count = misfit(residual[~one.rows]), int(np.sum(one.rows))
-            told = 0.0, left, f"left out, {'it' if one.kind == 'recording' else 'they'}"
+            change = 0.0, left, f"left out, {'it' if one.kind == 'recording' else 'they'}"
             residual[~one.rows] -= (self.residual - self.test.residual)[~one.rows]
             tested = self.test.left_out(residual, jacobian, one.rows)
-            self._note(one.name, one.kind, count, tested, self.tests * one.windows, told, left)
+            self._note(one.name, one.kind, count, tested, self.tests * one.windows, change, left)
 
     def _read(self) -> None:
         """Fit the readings that begin best, each from its own starts; misfits count against the spread of the data."""
