@@ -15,9 +15,9 @@ from shoal.cli import main
 from shoal.engines import get_engine
 from shoal.errors import ComputationError, InputError
 from shoal.notebook import uncertain
+from shoal.response.allocate import Confirmed, Cut
+from shoal.response.allocate import cheapest as within
 from shoal.response.allocation import Allocation, cheapest, with_factors
-from shoal.response.allocation_of_random import Confirmed, Cut
-from shoal.response.allocation_of_random import cheapest as within
 from shoal.response.inputs import Inputs, UncertainParameter
 from shoal.response.limits.estimate import ExceedanceEstimate
 from shoal.response.marginals import Frozen, Interval, Normal, Scaled, Uniform

@@ -12,7 +12,7 @@ import yaml
 from click.testing import CliRunner
 from shoal.cli import main
 from shoal.response import respond
-from shoal.response.control import COUNT, unseen
+from shoal.response.enclosure import CONTROLS, unseen
 from shoal.response.inputs import Inputs, UncertainParameter
 from shoal.response.marginals import Interval
 from shoal.response.runs import Answers
@@ -56,8 +56,8 @@ def test_what_is_smooth_is_told_as_before(count: int, seed: int) -> None:
     whole = count * (count + 1) / 2
     assert answer.bounds.upper[0] == pytest.approx(whole, rel=1e-12)
     assert math.isinf(answer.horizon)
-    assert answer.runs.controls == COUNT
-    assert answer.runs.own == answer.runs.evaluations - COUNT
+    assert answer.runs.controls == CONTROLS
+    assert answer.runs.own == answer.runs.evaluations - CONTROLS
 
 
 def test_the_share_that_may_be_unseen() -> None:
@@ -79,5 +79,5 @@ def test_a_peg_that_a_few_runs_miss_is_seen(tmp_path: Path) -> None:
     assert told["status"] == "beyond-horizon"
     assert told["bounds"]["P"]["x"]["lower"][0] < -1.0
     assert told["limits"][0]["kept"] is False
-    assert told["controls"] >= COUNT
+    assert told["controls"] >= CONTROLS
     assert told["unseen"] == pytest.approx(unseen(told["controls"]))

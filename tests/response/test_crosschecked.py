@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy import stats
 from shoal.notebook import uncertain
+from shoal.response.assess import shifts
 from shoal.response.limits import limit
-from shoal.response.limits.counted import contradictions
-from shoal.response.limits.crosschecked import shifts
 from shoal.response.limits.estimate import ExceedanceEstimate
+from shoal.response.limits.exceedance import contradictions
 from shoal.scene import Scene
 from sliding import puck
 

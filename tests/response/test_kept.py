@@ -9,8 +9,8 @@ import pytest
 from shoal.errors import ComputationError, InputError
 from shoal.notebook import uncertain
 from shoal.response import Response
-from shoal.response.kept import Keep
 from shoal.response.machine import ResponseModel
+from shoal.response.runs import Keep
 from shoal.scene import Scene
 from thrown import ALONG, THROWN, UP
 

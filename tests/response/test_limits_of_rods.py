@@ -9,8 +9,8 @@ import pytest
 from shoal.engines.gauss import GaussEngine
 from shoal.errors import InputError
 from shoal.notebook import uncertain
-from shoal.response.limits.dynamic import along, asked
 from shoal.response.limits.limit import limit
+from shoal.response.limits.quantities import engine_for, quantity_over_time
 from shoal.scene import Scene, load_scene
 
 G, LENGTH, THICK, STIFF = 9.81, 1.0, 0.05, 2e9
@@ -99,9 +99,9 @@ def test_sections_of_rods_in_space_are_those_of_cables_in_the_plane() -> None:
         told = []
         for scene in (plane, space):
             times = np.linspace(0.05, 0.2, 4)
-            motion = asked(GaussEngine(), scene, quantity).simulate(scene, times)
+            motion = engine_for(GaussEngine(), scene, quantity).simulate(scene, times)
             assert motion.ok, motion.message
-            told.append(along(motion, scene, {}, quantity, "m")[:, 0])
+            told.append(quantity_over_time(motion, scene, {}, quantity, "m")[:, 0])
         wanted, found = told if signed else np.abs(told)
         assert np.max(np.abs(wanted)) > {"normal": 1.0, "moment": 0.1, "strain_above": 5e-3}[quantity]
         np.testing.assert_allclose(found, wanted, atol=0.05 * np.max(np.abs(wanted)), err_msg=quantity)

@@ -10,8 +10,7 @@ from SALib import util
 from scipy import stats
 from shoal.errors import InputError
 from shoal.response.inputs import Inputs
-from shoal.response.read import parameters
-from shoal.response.salib import to_salib
+from shoal.response.read import parameters, to_salib
 from shoal.scene import load_scene
 
 MASS, ANGLE = "bodies.OA.mass", "initial.OA.angle"

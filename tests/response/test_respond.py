@@ -10,12 +10,11 @@ import pytest
 from scipy import stats
 from shoal.errors import ComputationError, InputError
 from shoal.response import respond
-from shoal.response.climb import IntArray
+from shoal.response.extremes import IntArray, search_valleys
 from shoal.response.inputs import Inputs, UncertainParameter
 from shoal.response.marginals import Empirical, Frozen, Interval, Marginal, Normal, Uniform
 from shoal.response.methods import methods
 from shoal.response.runs import Answers, Model
-from shoal.response.valleys import beside
 from shoal.trajectory import Array
 
 OSCILLATOR = np.array([5.0, 20.0, 50.0])
@@ -282,7 +281,7 @@ def test_of_two_valleys_along_an_axis_the_deeper_one_is_found() -> None:
 
     at = np.array([[1.0, -1.0], [1.0, -6 * math.pi / 25]])
     best = objective(at, np.arange(2))
-    beside(objective, best, at)
+    search_valleys(objective, best, at)
     assert at[:, 0] == pytest.approx([1.0, 1.0])
     assert at[:, 1] == pytest.approx(2 * math.pi / 25, abs=1e-5)
     assert best == pytest.approx(objective(at, np.arange(2)), abs=1e-15)

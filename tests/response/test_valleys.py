@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from shoal.response.climb import IntArray, climb_down
-from shoal.response.valleys import beside
+from shoal.response.extremes import IntArray, climb_down, search_valleys
 from shoal.trajectory import Array
 
 APART = 2 * np.pi / 50
@@ -23,7 +22,7 @@ def test_a_valley_that_is_less_deep_here_is_followed_to_where_it_is_deepest(star
     at = np.array([start])
     best = valleys(at, np.arange(1))
     climb_down(valleys, at, best)
-    beside(valleys, best, at)
+    search_valleys(valleys, best, at)
     assert best[0] == pytest.approx(-1.0, abs=1e-9)
     assert at[0] == pytest.approx([0.75, -APART], abs=1e-3)
     assert valleys(at, np.arange(1)) == best
@@ -34,9 +33,9 @@ def test_searches_do_not_disturb_one_another() -> None:
     starts = np.random.default_rng(3).uniform(-1, 1, (12, 2))
     together, values = starts.copy(), valleys(starts, np.arange(12))
     before = values.copy()
-    beside(valleys, values, together)
+    search_valleys(valleys, values, together)
     assert np.all(values <= before)
     for k, start in enumerate(starts):
         alone, value = start[None].copy(), valleys(start[None], np.arange(1))
-        beside(valleys, value, alone)
+        search_valleys(valleys, value, alone)
         assert values[k] == pytest.approx(value[0], abs=1e-9)

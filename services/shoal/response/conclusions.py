@@ -7,14 +7,14 @@ from dataclasses import replace
 
 from shoal.findings import Finding
 from shoal.response import findings as kinds
-from shoal.response.attained import DRAWN
-from shoal.response.boxes import HOPELESS
+from shoal.response.enclosure import WILKS
 from shoal.response.findings import in_order
-from shoal.response.model_errors import ModelErrors
+from shoal.response.probability_boxes import BEYOND_HOPE
 from shoal.response.problem import UncertainProblem
 from shoal.response.respond import ModelResponse
 from shoal.response.result import Response
 from shoal.response.runs import CachedModel
+from shoal.response.verify import ModelErrors
 
 NAMED = 3
 """Of the columns that miss a gap, named in the message."""
@@ -75,7 +75,7 @@ def _horizon(found: ModelResponse) -> list[Finding]:
         text = (
             f"bounds hold until {horizon:g} s; beyond, small changes of the parameters change everything, and what is "
             "reported is what runs attained, how far the machine reaches, and, if every value is as likely as another, "
-            f"where with 95 % confidence 95 % of all runs lie ({DRAWN} random runs)"
+            f"where with 95 % confidence 95 % of all runs lie ({WILKS} random runs)"
         )
     elif boxes.places:
         text = (
@@ -101,7 +101,7 @@ def _gap(response: Response, asked: float | None) -> list[Finding]:
 
 
 def _deviation(response: Response) -> list[Finding]:
-    if response.boxes is None or not response.boxes.std_gap > HOPELESS:
+    if response.boxes is None or not response.boxes.std_gap > BEYOND_HOPE:
         return []
     gap = response.boxes.std_gap
     text = f"standard deviations are known to {gap:.1e} of their size only, within the outer values"

@@ -1,14 +1,20 @@
-"""How far beyond the runs the answers can lie: what a surrogate foretells, widened by how wrong it may be.
+"""Attained and outer bounds of the answers, from runs and a surrogate.
 
 The error of a surrogate is known at runs; far from them it is as large as it was at runs that it had not seen. So it is
 taken to grow with the distance from the nearest run, as fast as an error of the surrogate's degree can: a polynomial of
 total degree n that is at most e on the box changes by at most n e for every radian between the places arccos(u) of two
-germs (Bernstein's inequality). Where a bound is attained by a run, and the answer falls off from there faster than
+points (Bernstein's inequality). Where a bound is attained by a run, and the answer falls off from there faster than
 that, the attained bound is the bound.
+
+Few runs are fitted by a polynomial of low degree whatever lies between them, and extremal points of that polynomial are
+where it is evaluated. Control runs, which do not depend on it, lie all over the box.
 """
 
 from __future__ import annotations
 
+import math
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -16,9 +22,53 @@ from scipy.spatial import cKDTree
 
 from shoal.response.expansion import Expansion
 from shoal.response.extremes import Extremes, Surrogate, extremes, in_parts, places
-from shoal.response.inputs import IntArray
-from shoal.response.study import SAFETY, Enclosure, Looked, Study
+from shoal.response.inputs import BoolArray, IntArray
+from shoal.response.runs import TooManyRunsError
+from shoal.response.study import FINE_GAP, SAFETY, Enclosure, Found, Looked, Study
 from shoal.trajectory import Array
+
+CONTROLS = 64
+"""Runs, a power of two: along each axis one lies in every 64th, so that none misses a band of 3 % across the box."""
+UNSEEN = 0.05
+"""One less the confidence with which a larger part of the box than `unseen` would have been seen."""
+
+
+def unseen(count: int) -> float:
+    """The share of the box that so many runs all over it miss with a probability of 5 %: about 3 / count.
+
+    With independent runs (1 - share)^count = 0.05; evenly spread ones see a part that hangs together sooner.
+    """
+    return float(1 - UNSEEN ** (1 / count)) if count else 1.0
+
+
+def control_misses(study: Study, surrogate: Surrogate) -> Array:
+    """Make the runs, as many as may be made, and tell by how much a surrogate misses them at most, (columns,).
+
+    Raises TooManyRunsError, InputError.
+    """
+    runs, made = study.runs, len(study.runs.germs)
+    count = min(CONTROLS, runs.left)
+    if count:
+        runs.controls += runs.all(study.inputs.sobol(count, study.seed + 5, runs.controls))
+    return np.asarray(np.abs(surrogate(runs.germs[made:]) - runs.values[made:]).max(axis=0, initial=0.0))
+
+
+def contradicts(study: Study, missed: Array, error: Array) -> BoolArray:
+    """Return whether runs are missed by more than the error that was told, and by what matters, (columns,)."""
+    return np.asarray(missed > SAFETY * error + FINE_GAP * study.widths(study.runs.values))
+
+
+def with_controls(study: Study, looked: Looked | None) -> Looked | None:
+    """Bounds with runs that they foretold."""
+    if looked is None:
+        return None
+    values, told = study.runs.values, looked.told
+    lower, upper = values.min(axis=0), values.max(axis=0)
+    low, high = np.minimum(told.lower_outer, lower), np.maximum(told.upper_outer, upper)
+    width, beyond = study.widths(values), np.maximum(lower - low, high - upper)
+    gap = np.divide(beyond, width, out=np.zeros_like(beyond), where=width > 0)
+    return Looked(study.runs.evaluations, Enclosure(lower, upper, low, high, gap))
+
 
 Look = Literal["there", "scanned", "everywhere"]
 ARMS = 1.0, 0.3, 0.1
@@ -115,3 +165,184 @@ def _widened(
                     value[better], at[better] = now[better], beside[better]
         best = np.minimum(best, value)
     return best[:columns], -best[columns:]
+
+
+WILKS = 93
+"""Random runs between whose extremes 95 % of all lie with 95 % confidence: 1 - 0.95^n - n 0.05 0.95^(n-1) >= 0.95."""
+TESTED, TEST_SPACING = 1, 0.05
+"""Extremal points that are run for each parameter, and how far apart, where a surrogate of cycles tells the bounds."""
+ATTAINING, AT_ONCE = 16, 64
+"""Times the fair number of runs that are made at most to attain bounds of a surrogate of cycles, so many at once."""
+ATTAINED = 0.1
+"""Share of the gap by which a run may lie inside what is foretold and count as attaining it."""
+SEARCHES = 8
+"""Searches for the extremes of a surrogate of cycles."""
+BELIEVED = 0.2
+"""Of the width: the largest gap of bounds that are told. A surrogate that misses more has not seen what is there."""
+
+
+@dataclass(frozen=True, eq=False)
+class Bounds:
+    """Of every column. lower, upper: attained by runs or, at long times, by runs at the arguments named, to within the
+    error of the surrogate of cycles; lower_outer, upper_outer: no run is expected beyond, nan where
+    the method cannot tell, (columns,); at_lower, at_upper: values of the parameters there, (columns, parameters);
+    gap: the largest distance between both as a share of the width within the horizon, nan where it is not known;
+    horizon: the last instant up to which they meet [s], infinite if they always do; likely: where, with 95 %
+    confidence, 95 % of all runs lie if each value of the parameters is as likely as another, (2, columns), None within
+    the horizon
+    """
+
+    lower: Array
+    upper: Array
+    lower_outer: Array
+    upper_outer: Array
+    at_lower: Array
+    at_upper: Array
+    gap: float
+    horizon: float
+    likely: Array | None = None
+
+
+def bounds_of(study: Study, found: Found) -> Bounds:
+    """Attained bounds of all runs, after the extremal points of the surrogate are run, and outer ones by its error."""
+    runs, error, surrogate = study.runs, found.error, found.surrogate
+    named = None
+    known = found.looked is not None and found.looked.runs == runs.evaluations
+    if surrogate is not None and not known:
+        # Over many cycles there are many extremes.
+        how = (SEARCHES, error) if found.foretold else (1, None)
+        named = extremes(surrogate, len(study.inputs), runs.values.shape[1], study.seed, *how)
+        if error is None:
+            error = _confirmed(study, surrogate, named)
+        elif found.foretold:
+            error = _tested(study, surrogate, named, error)
+        if error is not None and not runs.controls:
+            error = _controlled(study, surrogate, error)
+        if found.foretold:
+            _attain(study, surrogate, named)
+    values, germs = runs.values, runs.germs
+    at_lower, at_upper = germs[values.argmin(axis=0)], germs[values.argmax(axis=0)]
+    lower, upper = values.min(axis=0), values.max(axis=0)
+    unknown = np.full(len(lower), np.nan)
+    told = Enclosure(lower, upper, unknown, unknown, unknown)
+    if known and found.looked is not None:
+        told = found.looked.told
+    elif surrogate is not None and named is not None and error is not None:
+        told = (foretold if found.foretold else enclosure)(study, surrogate, named, error)
+    end = _horizon(study, told.gap)
+    within = told.gap[study.instants <= end]
+    return Bounds(
+        told.lower,
+        told.upper,
+        told.lower_outer,
+        told.upper_outer,
+        study.inputs.named(at_lower),
+        study.inputs.named(at_upper),
+        float(within.max()) if within.size else math.nan,
+        end,
+    )
+
+
+def likely(study: Study, bounds: Bounds) -> Bounds:
+    """Beyond the horizon: between the least and the largest of 93 random runs lie, with 95 % confidence, 95 % of all.
+
+    Whatever the distribution of the answers (Wilks, Determination of sample sizes for setting tolerance limits, Annals
+    of Mathematical Statistics 12, 1941); the intervals are taken as evenly likely.
+    """
+    runs, made, failed = study.runs, len(study.runs.germs), study.runs.failed
+    runs.all(study.inputs.drawn(WILKS, study.seed + 1))
+    if runs.failed > failed:
+        return bounds
+    drawn, germs = runs.values[made:], study.inputs.named(runs.germs[made:])
+    low, high = drawn.min(axis=0), drawn.max(axis=0)
+    lower, upper = low < bounds.lower, high > bounds.upper
+    return replace(
+        bounds,
+        lower=np.where(lower, low, bounds.lower),
+        upper=np.where(upper, high, bounds.upper),
+        lower_outer=np.fmin(bounds.lower_outer, low),
+        upper_outer=np.fmax(bounds.upper_outer, high),
+        at_lower=np.where(lower[:, None], germs[drawn.argmin(axis=0)], bounds.at_lower),
+        at_upper=np.where(upper[:, None], germs[drawn.argmax(axis=0)], bounds.at_upper),
+        likely=np.stack([low, high]),
+    )
+
+
+def _confirmed(study: Study, surrogate: Surrogate, foretold: Extremes) -> Array | None:
+    """The error of a surrogate at its own extremal points, which are run; None if there are no runs left for it.
+
+    At least that at runs that are left out of it, where it knows that.
+    """
+    runs = study.runs
+    wanted: Array = np.unique(np.round(np.vstack([foretold.at_lower, foretold.at_upper]), 2), axis=0)
+    wanted = wanted[: max(0, min(len(wanted), runs.left, study.fair))]
+    made = len(runs.germs)
+    if not len(wanted) or runs(wanted) == 0:
+        return None
+    missed = np.abs(surrogate(runs.germs[made:]) - runs.values[made:]).max(axis=0, initial=0.0)
+    return np.asarray(np.maximum(missed, getattr(surrogate, "left_out", 0.0)))
+
+
+def _controlled(study: Study, surrogate: Surrogate, error: Array) -> Array:
+    """The error of a surrogate, or what it misses of runs all over the box that contradict it."""
+    with suppress(TooManyRunsError):
+        missed = control_misses(study, surrogate)
+        return np.where(contradicts(study, missed, error), missed, error)
+    return error
+
+
+def _tested(study: Study, surrogate: Surrogate, named: Extremes, error: Array) -> Array:
+    """The error of a surrogate of cycles, or its error at the extremal points that promise most, which are run.
+
+    Elsewhere it may foretell well and still miss there: a ball that touches the ground has its least height in a cusp.
+    """
+    runs, count = study.runs, TESTED * len(study.inputs)
+    values = runs.values
+    width = np.tile(study.widths(values), 2)
+    gains = np.concatenate([values.min(axis=0) - named.lower, named.upper - values.max(axis=0)])
+    share = np.divide(gains, width, out=np.zeros_like(gains), where=width > 0)
+    places: list[Array] = []
+    for place in np.concatenate([named.at_lower, named.at_upper])[np.argsort(-share)]:
+        if len(places) < count and all(np.abs(place - other).max() > TEST_SPACING for other in places):
+            places.append(place)
+    made = len(runs.germs)
+    if runs.left < count or runs(np.array(places)) == 0:
+        return error
+    missed = np.abs(surrogate(runs.germs[made:]) - runs.values[made:]).max(axis=0)
+    return np.maximum(error, study.largest(missed, runs.values))
+
+
+def _attain(study: Study, surrogate: Surrogate, named: Extremes) -> None:
+    """Make the runs at the arguments of the extremes: one attains all that the surrogate foretells no better elsewhere.
+
+    Of all arguments that one is next whose run attains most; as many as the gap that is asked for takes, or `ATTAINING`
+    times the fair number of runs.
+    """
+    runs, values = study.runs, study.runs.values
+    most = runs.left if study.gap is not None else min(runs.left, ATTAINING * study.fair)
+    near = ATTAINED * (study.gap or FINE_GAP) * study.widths(values)
+    best = np.concatenate([named.lower, -named.upper])
+    signs, near = np.repeat([1.0, -1.0], len(named.lower)), np.tile(near, 2)
+    open_sides = np.concatenate([values.min(axis=0), -values.max(axis=0)]) > best + near
+    places = np.concatenate([named.at_lower, named.at_upper])
+    made = 0
+    while open_sides.any() and made < most:
+        chosen: list[Array] = []
+        left = open_sides.copy()
+        while left.any() and len(chosen) < min(AT_ONCE, most - made):
+            place = places[np.flatnonzero(left)[left.sum() // 2]]
+            chosen.append(place)
+            told = surrogate(place[None])[0]
+            left &= signs * np.tile(told, 2) > best + near
+            left[np.all(places == place, axis=1)] = False
+        runs.named += runs(np.array(chosen))
+        made += len(chosen)
+        open_sides = left
+
+
+def _horizon(study: Study, gap: Array) -> float:
+    """The last instant up to which outer and attained bounds meet [s]; infinite if they do at all, or are unknown."""
+    first = study.instants[np.nan_to_num(gap) > max(study.gap or 0.0, BELIEVED)].min(initial=math.inf)
+    if math.isinf(first):
+        return math.inf
+    return float(study.instants[study.instants < first].max(initial=0.0))

@@ -1,15 +1,22 @@
-"""A polynomial in the germs, fitted to runs: the surrogate of most methods."""
+"""Polynomial expansions in the standardised variables, fitted to runs by least squares: the surrogate of most methods.
+
+The degree is that which predicts best, column by column, what is left out of the fit. Hermite polynomials of high
+degree have most of their variance further out than any run, where nothing else constrains them: the outermost runs,
+which the others predict, show some of it, and the standard deviation at places as far out as runs go shows the rest.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from scipy.linalg import solve_triangular
 
 from shoal.response.inputs import BoolArray, Inputs, IntArray
-from shoal.response.polynomials import Terms
+from shoal.response.polynomials import Terms, size, total_degree
+from shoal.response.study import Study
 from shoal.trajectory import Array
 
 RANK = 1e-13
@@ -99,3 +106,72 @@ def unexplained(values: Array, missed: Array) -> tuple[Array, Array]:
     deviation = np.sqrt(np.mean(away**2, axis=0))
     off = np.divide(squares, 2 * deviation, out=np.zeros_like(squares), where=deviation > 0)
     return np.sqrt(np.mean(missed**2, axis=0)), np.asarray(off)
+
+
+HIGHEST_TRIED = 20
+WORSE = 2
+"""Degrees in a row that no column gains by, after which no higher one is tried."""
+
+
+def choose_degree(study: Study, share: float, judged: Callable[[Expansion], Expansion]) -> Expansion:
+    """Of `degree`, or of each column's own among those that the runs carry: so many for every term, at least.
+
+    judged: an expansion with what else is known of its error
+    """
+    runs, parameters = study.runs, len(study.inputs)
+    highest = study.inputs.highest(HIGHEST_TRIED)
+    known: Expansion | None = None
+    worse = 0
+    for degree in [study.degree] if study.degree else range(1, HIGHEST_TRIED + 1):
+        if known is not None and share * size(parameters, degree) > len(runs.germs):
+            break
+        terms = total_degree(parameters, degree)
+        found = judged(fit(study.inputs, runs.germs, runs.values, terms[(terms <= highest).all(axis=1)]))
+        if known is None:
+            known = found
+            continue
+        better = found.left_out < known.left_out
+        known = found.where(better, known)
+        worse = 0 if better.any() else worse + 1
+        if worse == WORSE:
+            break
+    assert known is not None
+    return known
+
+
+OUTER = 0.06
+"""Share of the runs that are taken for the outermost."""
+PROBED = 1024
+"""Places at which the deviation is looked at."""
+MISSED = 0.05
+"""Share of a deviation that so few places may miss."""
+
+
+def outermost(inputs: Inputs, germs: Array) -> BoolArray:
+    """Which runs are, (runs,); none where all germs are bounded, or where all are as far out."""
+    far = np.abs(germs[:, inputs.unbounded]).max(axis=1, initial=0.0)
+    outer = np.asarray(far >= np.sort(far)[-max(1, int(OUTER * len(far)))])
+    return outer & inputs.unbounded.any() & ~outer.all()
+
+
+def outwards(germs: Array, values: Array, found: Expansion) -> Expansion:
+    """With the error of the outermost runs where its terms are fitted to all others."""
+    outer = outermost(found.inputs, germs)
+    if not outer.any():
+        return found
+    basis = found.inputs.basis(germs, found.terms)
+    told = np.linalg.lstsq(basis[~outer], values[~outer], rcond=None)[0]
+    missed = basis[outer] @ told - values[outer]
+    beyond = np.sqrt((missed**2).sum(axis=0) / len(germs))
+    return replace(found, left_out=np.maximum(found.left_out, beyond))
+
+
+def hidden(coefficients: Array, inputs: Inputs, terms: Terms) -> Array:
+    """Part of the deviation in closed form that places as far out as runs go do not show, (columns,); 0 where it is no
+    more than these places may miss.
+
+    coefficients: of the terms, the constant first, (columns, terms)
+    """
+    seen = (inputs.basis(inputs.sobol(PROBED, 0), terms) @ coefficients.T).std(axis=0)
+    apart = np.abs(np.sqrt((coefficients[:, 1:] ** 2).sum(axis=1)) - seen)
+    return np.where(apart > MISSED * seen, apart, 0.0)

@@ -13,8 +13,7 @@ from shoal.engines.one_by_one import one_by_one
 from shoal.engines.starts import Tally
 from shoal.errors import InputError, UnstableStepError
 from shoal.response.inputs import BoolArray, IntArray
-from shoal.response.kept import Keep
-from shoal.response.runs import Answers
+from shoal.response.runs import Answers, Keep
 from shoal.scene import Scene
 from shoal.trajectory import Array, Status, Trajectory
 

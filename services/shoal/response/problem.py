@@ -18,13 +18,13 @@ from shoal.memory import Memory
 from shoal.requests.uncertain import Uncertain
 from shoal.response.allocation import costs_of
 from shoal.response.inputs import Inputs
-from shoal.response.kept import Keep
 from shoal.response.limits.choice import get_way
 from shoal.response.limits.judge import require
 from shoal.response.limits.limit import Limit, read_limits
 from shoal.response.limits.quantities import of_section
 from shoal.response.machine import ResponseModel
 from shoal.response.read import parameters
+from shoal.response.runs import Keep
 from shoal.scene import Scene
 from shoal.trajectory import Array
 from shoal.versions import versions

@@ -18,9 +18,8 @@ from scipy.linalg import cho_solve, cholesky
 from scipy.optimize import minimize
 from scipy.special import gammaln
 
-from shoal.response.expansion import Expansion, unexplained
+from shoal.response.expansion import Expansion, outermost, unexplained
 from shoal.response.inputs import Inputs
-from shoal.response.outermost import outermost
 from shoal.response.polynomials import Terms
 from shoal.trajectory import Array
 

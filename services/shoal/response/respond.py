@@ -1,4 +1,4 @@
-"""Any model whose parameters are known as intervals or distributions: runs by a method -> bounds or statistics."""
+"""Response of any model whose parameters are intervals or distributions, and of the markers of a machine."""
 
 from __future__ import annotations
 
@@ -9,18 +9,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shoal.errors import InputError
-from shoal.response.attained import DRAWN, bounds_of, likely
-from shoal.response.boxes import Boxes, boxes_of, sampled
+from shoal.errors import ComputationError, InputError
+from shoal.mechanics import reach
+from shoal.response.enclosure import WILKS, Bounds, bounds_of, likely
 from shoal.response.expansion import Expansion
-from shoal.response.inner import resolved
 from shoal.response.inputs import Inputs
-from shoal.response.kept import TimeIsUpError
+from shoal.response.machine import ResponseModel
 from shoal.response.methods import get_method
-from shoal.response.result import Bounds
-from shoal.response.runs import CachedModel, Model, TooManyRunsError
-from shoal.response.statistics import DRAWN as PLACES
+from shoal.response.methods.nested import resolved
+from shoal.response.probability_boxes import ProbabilityBoxes, boxes_of, sampled
+from shoal.response.problem import UncertainProblem
+from shoal.response.runs import CachedModel, Model, TimeIsUpError, TooManyRunsError
 from shoal.response.statistics import QUANTILES, Statistics, either, masked, of_expansion, of_runs
+from shoal.response.statistics import DRAWN as PLACES
 from shoal.response.study import Found, LinkedMoments, Study
 from shoal.trajectory import Array
 
@@ -38,7 +39,7 @@ class ModelResponse:
     runs: CachedModel
     bounds: Bounds | None
     statistics: Statistics | None
-    boxes: Boxes | None = None
+    boxes: ProbabilityBoxes | None = None
 
     @property
     def drawn(self) -> Array:
@@ -47,7 +48,7 @@ class ModelResponse:
         return values if self.found.drawn is None else values[len(values) - self.found.drawn :]
 
     @property
-    def bounded(self) -> Bounds | Boxes | None:
+    def bounded(self) -> Bounds | ProbabilityBoxes | None:
         """What has a horizon and a gap."""
         return self.bounds or self.boxes
 
@@ -96,7 +97,7 @@ def respond(
         bounds = None if random.any() else bounds_of(study, found)
     except TimeIsUpError:
         bounds = bounds_of(study, _broken_off(runs))
-    if bounds is not None and math.isfinite(bounds.horizon) and runs.left >= DRAWN:
+    if bounds is not None and math.isfinite(bounds.horizon) and runs.left >= WILKS:
         with suppress(TimeIsUpError):
             bounds = likely(study, bounds)
     statistics = _statistics(study, found) if random.all() else None
@@ -143,3 +144,50 @@ def _over(told: Statistics, linked: LinkedMoments, study: Study) -> Statistics:
         if not study.inputs.correlations:
             first[:, columns], total[:, columns] = link.indices()
     return replace(told, mean=linked.mean, std=np.sqrt(linked.variance), quantiles=quantiles, first=first, total=total)
+
+
+def respond_markers(problem: UncertainProblem) -> ModelResponse:
+    """Make the runs of a method; beyond a horizon outer bounds are the kinematic reach.
+
+    Raises InputError, and ComputationError if there is no time for the first runs.
+    """
+    asked, model = problem.asked, problem.model
+    instants, markers, quantities = model.columns
+    each = markers * quantities
+    try:
+        found = respond(
+            model,
+            problem.inputs,
+            instants * each,
+            method=asked.method,
+            groups=np.tile(np.arange(each), instants),
+            instants=np.repeat(model.times, each),
+            gap=asked.gap,
+            degree=asked.degree,
+            count=asked.count,
+            seed=asked.seed,
+            most=asked.runs,
+            progress=asked.progress,
+            over_time=lambda times: replace(model, times=times, keep=None),
+        )
+    except TimeIsUpError:
+        raise ComputationError("time-limit: it was over before the first runs were made") from None
+    if found.bounds is None or math.isinf(found.horizon):
+        return found
+    return replace(found, bounds=_within_reach(found.bounds, model, problem.inputs))
+
+
+def _within_reach(bounds: Bounds, model: ResponseModel, inputs: Inputs) -> Bounds:
+    """Return bounds whose outer ones beyond the horizon are the kinematic reach; angles have none."""
+    scene = model.scene
+    ends = inputs.values(np.array([-np.ones(len(inputs)), np.ones(len(inputs))]))
+    length = max(float(np.max(reach.size(scene.with_lanes(ends)))), 0.0) if reach.tethered(scene) else math.inf
+    anchors = reach.anchors(scene)
+    far = np.full((*model.columns, 2), math.nan)
+    for axis in range(scene.dimensions):
+        far[:, :, axis, 0] = anchors[:, axis].min() - reach.MARGIN * length
+        far[:, :, axis, 1] = anchors[:, axis].max() + reach.MARGIN * length
+    late = np.repeat(model.times > bounds.horizon, int(np.prod(model.columns[1:])))
+    lower, upper = bounds.lower_outer.copy(), bounds.upper_outer.copy()
+    lower[late], upper[late] = far.reshape(-1, 2)[late].T
+    return replace(bounds, lower_outer=lower, upper_outer=upper)

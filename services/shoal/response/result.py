@@ -13,14 +13,14 @@ from shoal.error_budget import GOOD, ErrorBudget, Grade
 from shoal.errors import InputError
 from shoal.findings import Concluded, Finding
 from shoal.response.allocation import Allocation
-from shoal.response.boxes import Boxes
-from shoal.response.control import unseen
+from shoal.response.enclosure import Bounds, unseen
 from shoal.response.findings import ResponseStatus, status_of
-from shoal.response.finer import Finer
 from shoal.response.inputs import Inputs
 from shoal.response.limits import LimitResult
 from shoal.response.marginals import Interval
+from shoal.response.probability_boxes import ProbabilityBoxes
 from shoal.response.statistics import QUANTILES, Statistics
+from shoal.response.verify import Finer
 from shoal.scene import Scene
 from shoal.trajectory import Array, plain
 
@@ -30,28 +30,6 @@ if TYPE_CHECKING:
 FAIR = 0.1
 """Share of what varies up to which a known error of the model is small: a tenth of the width moves no bound far."""
 BOUNDS = "lower", "upper", "lower_outer", "upper_outer"
-
-
-@dataclass(frozen=True, eq=False)
-class Bounds:
-    """Of every column. lower, upper: attained by runs or, at long times, by runs at the arguments named, to within the
-    error of the surrogate of cycles; lower_outer, upper_outer: no run is expected beyond, nan where
-    the method cannot tell, (columns,); at_lower, at_upper: values of the parameters there, (columns, parameters);
-    gap: the largest distance between both as a share of the width within the horizon, nan where it is not known;
-    horizon: the last instant up to which they meet [s], infinite if they always do; likely: where, with 95 %
-    confidence, 95 % of all runs lie if each value of the parameters is as likely as another, (2, columns), None within
-    the horizon
-    """
-
-    lower: Array
-    upper: Array
-    lower_outer: Array
-    upper_outer: Array
-    at_lower: Array
-    at_upper: Array
-    gap: float
-    horizon: float
-    likely: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +70,7 @@ class Response(Concluded):
     engine: str
     limits: tuple[LimitResult, ...] = ()
     allocation: Allocation | None = None
-    boxes: Boxes | None = None
+    boxes: ProbabilityBoxes | None = None
     finer: Finer | None = None
     controls: int = 0
     elsewhere: Elsewhere | None = None

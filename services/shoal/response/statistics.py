@@ -1,13 +1,25 @@
-"""What a distribution of answers is like: from an expansion where there is one, else from the runs themselves."""
+"""Statistics of distributions of answers: moments, quantiles and Sobol's indices, with their errors.
+
+Sobol's indices by Jansen's estimator: Jansen, Analysis of variance designs for model output, Computer Physics
+Communications 117, 1999; Saltelli et al., Variance based sensitivity analysis of model output, 2010, table 2 (c, f).
+
+Errors of the moments of an expansion: what is left out of a fit says how much single runs are off. It says nothing of
+tails that runs do not reach, nor of a standard deviation that a smooth polynomial loses. Half of the runs know less of
+both than all: the differences between expansions of either half and of all estimate what is missing.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
+from scipy.stats import qmc
 
 from shoal.response.expansion import Expansion
-from shoal.response.inputs import BoolArray, Inputs
+from shoal.response.inputs import BoolArray, Inputs, inside
+from shoal.response.study import Study
 from shoal.trajectory import Array
 
 QUANTILES = 0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99
@@ -94,3 +106,74 @@ def masked(found: Statistics, scale: Array) -> Statistics:
     first, total = found.first.copy(), found.total.copy()
     first[:, nothing] = total[:, nothing] = np.nan
     return replace(found, first=first, total=total)
+
+
+def designs(inputs: Inputs, base: int, seed: int) -> Array:
+    """Germs of A, of B and of A with each parameter of B, (parameters + 2) times `base`, (places, parameters)."""
+    parameters = len(inputs)
+    x = inside(qmc.Sobol(2 * parameters, rng=seed).random(base))
+    one, other = x[:, :parameters], x[:, parameters:]
+    found = [one, other]
+    for k in range(parameters):
+        mixed = one.copy()
+        mixed[:, k] = other[:, k]
+        found.append(mixed)
+    return inputs.germs(np.concatenate(found))
+
+
+def jansen(values: Array, parameters: int) -> Array:
+    """First and total indices, (2, parameters, columns), of the answers at `designs`, (places, columns)."""
+    blocks = values.reshape(parameters + 2, len(values) // (parameters + 2), -1)
+    one, other = blocks[0], blocks[1]
+    variance = np.var(np.concatenate([one, other]), axis=0)
+    found = np.full((2, parameters, values.shape[1]), np.nan)
+    varies = variance > 0
+    for k in range(parameters):
+        mixed = blocks[2 + k]
+        unexplained = 0.5 * np.mean((other - mixed) ** 2, axis=0)
+        own = 0.5 * np.mean((one - mixed) ** 2, axis=0)
+        found[0, k, varies] = 1 - unexplained[varies] / variance[varies]
+        found[1, k, varies] = own[varies] / variance[varies]
+    return found
+
+
+HALVES = 2.0
+"""Times what a half tells apart from all."""
+
+
+class Moments(Protocol):
+    """What an expansion tells, (columns,) each."""
+
+    @property
+    def mean(self) -> Array:
+        """Over all parameters."""
+        ...
+
+    @property
+    def variance(self) -> Array:
+        """Over all parameters."""
+        ...
+
+    @property
+    def left_out(self) -> Array:
+        """Error at runs that are left out of the fit."""
+        ...
+
+    @property
+    def squares(self) -> Array | None:
+        """The same of squares."""
+        ...
+
+
+def moment_errors(study: Study, found: Moments, fitted: Callable[[Study], Moments]) -> tuple[Array, Array]:
+    """Within which mean and std lie with 95 % confidence, (columns,) each; fitted: what fewer runs tell."""
+    made, std, left_out = len(study.runs.germs), np.sqrt(found.variance), found.left_out
+    squares = left_out if found.squares is None else np.maximum(found.squares, left_out)
+    missing = np.divide(left_out**2, 2 * std, out=np.zeros_like(std), where=std > 0)
+    scatter = SURE * np.array([left_out / np.sqrt(made), np.hypot(squares / np.sqrt(made), missing)])
+    apart, first = np.zeros_like(scatter), np.arange(made) < made // 2
+    for half in (first, ~first):
+        part = fitted(replace(study, runs=study.runs.part(half)))
+        apart = np.maximum(apart, np.abs([part.mean - found.mean, np.sqrt(part.variance) - std]))
+    mean, deviation = np.hypot(scatter, HALVES * apart)
+    return mean, deviation

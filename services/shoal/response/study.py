@@ -1,4 +1,4 @@
-"""What a method is given, and what it gives back."""
+"""A study as methods see it, what they return, and the interface of surrogates: a plan of runs and a fit to them."""
 
 from __future__ import annotations
 
@@ -179,3 +179,28 @@ class Found:
 
 
 Method = Callable[[Study], Found]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Runs of a surrogate and its fit.
+
+    places: standardised variables of the runs, (runs, parameters), from -1 to 1; fit: to the runs that did not fail;
+    about: both in words. The error of the surrogate is estimated from further runs, alike for all of them
+    """
+
+    places: Array
+    fit: Callable[[Study], Surrogate]
+    about: str
+
+
+def fitted(name: str, plan: Callable[[Study], Plan]) -> Method:
+    """Return the method of that name for intervals. It raises InputError and ComputationError."""
+
+    def method(study: Study) -> Found:
+        study.intervals_only(name)
+        planned = plan(study)
+        study.runs(planned.places)
+        return Found(planned.about, planned.fit(study))
+
+    return method

@@ -7,10 +7,11 @@ from dataclasses import replace
 
 from shoal.compile import clock
 from shoal.requests.uncertain import Uncertain
-from shoal.response.assess import allocate, allow_for_limits, assess_limits
+from shoal.response.allocate import allocate
+from shoal.response.assess import allow_for_limits, assess_limits
 from shoal.response.conclusions import findings_about, withheld
-from shoal.response.markers import respond_markers
 from shoal.response.problem import read
+from shoal.response.respond import respond_markers
 from shoal.response.result import Response
 from shoal.response.verify import compare_meshes, known_errors
 from shoal.scene import Scene

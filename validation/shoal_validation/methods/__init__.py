@@ -5,8 +5,7 @@ Their names are those of `shoal uncertain --method`. Surrogates are rows of one 
 
 from __future__ import annotations
 
-from shoal.response.methods.fitted import fitted
-from shoal.response.study import Method
+from shoal.response.study import Method, fitted
 
 from shoal_validation.methods import polynomial_fits as polynomials
 from shoal_validation.methods.envelope import rs_ht, rs_lmd

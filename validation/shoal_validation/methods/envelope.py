@@ -17,10 +17,16 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 from scipy.signal import hilbert
 from shoal.errors import InputError
-from shoal.response.course import UnsuitableError, refuse_without_course, spline, turning_points, watch
 from shoal.response.expansion import Expansion, fit
 from shoal.response.inputs import IntArray
-from shoal.response.methods.long_time import missing
+from shoal.response.methods.long_time import (
+    UnsuitableError,
+    missing,
+    refuse_without_course,
+    spline,
+    turning_points,
+    watch,
+)
 from shoal.response.polynomials import total_degree
 from shoal.response.study import Found, Study
 from shoal.trajectory import Array

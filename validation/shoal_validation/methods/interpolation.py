@@ -11,8 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import RBFInterpolator
 from shoal.response.inputs import IntArray
-from shoal.response.methods.fitted import Plan
-from shoal.response.study import Study
+from shoal.response.study import Plan, Study
 from shoal.trajectory import Array
 
 COUNT = 20

@@ -19,9 +19,8 @@ from itertools import product
 import numpy as np
 from shoal.response.design import telling
 from shoal.response.expansion import fit
-from shoal.response.methods.fitted import Plan
 from shoal.response.polynomials import Terms, size, tensor, total_degree
-from shoal.response.study import Study
+from shoal.response.study import Plan, Study
 from shoal.trajectory import Array
 
 DEGREE = 4

@@ -16,9 +16,8 @@ import numpy as np
 from shoal.errors import ComputationError
 from shoal.response.expansion import Expansion, fit
 from shoal.response.inputs import IntArray
-from shoal.response.methods.fitted import Plan
 from shoal.response.polynomials import total_degree
-from shoal.response.study import Study
+from shoal.response.study import Plan, Study
 from shoal.trajectory import Array
 
 STEP = 0.05

@@ -12,16 +12,14 @@ import numpy as np
 from shoal.errors import InputError
 from shoal.findings import Finding
 from shoal.response import findings as kinds
-from shoal.response.kept import TimeIsUpError
-from shoal.response.limits.counted import contradictions
 from shoal.response.limits.estimate import ExceedanceEstimate
-from shoal.response.limits.exceedance import Exceedance, coarse
+from shoal.response.limits.exceedance import Exceedance, coarse, contradictions
 from shoal.response.limits.form import APART, SHARES, DesignPoint, design_points, distinct
 from shoal.response.limits.importance import Sample, adapted, controlled, sample
 from shoal.response.limits.margins import Margins, least
 from shoal.response.limits.subset import Levels, subset
 from shoal.response.limits.surface import Surface, fit_surface
-from shoal.response.runs import TooManyRunsError
+from shoal.response.runs import TimeIsUpError, TooManyRunsError
 from shoal.trajectory import Array
 
 OFTEN = 0.1

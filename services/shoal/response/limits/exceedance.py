@@ -1,10 +1,15 @@
-"""The probability that a limit is exceeded as a reliability method finds it, with reasons for doubt."""
+"""Probability that a limit is exceeded as a reliability method finds it, with reasons for doubt.
+
+One of them is a binomial test against plain Monte Carlo runs, which are unbiased.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy import stats
 
 from shoal.findings import Finding
 from shoal.response import findings as kinds
@@ -47,3 +52,42 @@ def coarse(estimate: ExceedanceEstimate) -> list[Finding]:
         return []
     text = f"the coefficient of variation of the probability is {estimate.coefficient:.2f}"
     return [kinds.COARSE.found(text, coefficient=estimate.coefficient)]
+
+
+CHANCE = 1e-3
+"""Counts that are less likely than this contradict a probability."""
+ROUGH = 2.0
+"""A probability without an interval may be off by this factor."""
+
+
+def contradictions(
+    estimate: ExceedanceEstimate, margins: Array, share: float = 1.0, outside: float = 1.0
+) -> list[Finding]:
+    """Return a finding where the number of runs beyond the limit is unlikely (binomial tests of both ends, one-sided).
+
+    margins: of runs drawn from the distributions, (runs, instants); share: of them that counts as independent;
+    outside: probability of that part of the distributions which they are drawn from: what passes may lie elsewhere, so
+    that few say nothing
+    """
+    lower, upper = ends(estimate)
+    exceeding, made = int(np.any(margins < 0, axis=1).sum()), len(margins)
+    count = int(share * made)
+    few = stats.binom.cdf(math.ceil(share * exceeding), count, lower) if outside == 1 else 1.0
+    many = stats.binom.sf(math.floor(share * exceeding) - 1, count, min(upper / outside, 1.0))
+    if min(few, many) >= CHANCE:
+        return []
+    said = f"{estimate.why} says {estimate.probability:.1e}"
+    runs = "plain runs" if outside == 1 else f"runs from the outer {outside:.1e} of the distributions"
+    counted = outside * exceeding / made
+    text = f"{said}, but of {made} {runs} {exceeding} exceed it, which makes {counted:.1e}"
+    return [kinds.CONTRADICTED.found(text, probability=estimate.probability, counted=counted, runs=made)]
+
+
+def ends(estimate: ExceedanceEstimate) -> tuple[float, float]:
+    """Return the ends of the interval of 95 % confidence, or of one around a probability that has none."""
+    lower, upper = (float(end[-1]) for end in estimate.interval)
+    if not math.isnan(lower) and not math.isnan(upper):
+        return lower, upper
+    if math.isnan(estimate.probability):
+        return 0.0, 1.0
+    return estimate.probability / ROUGH, min(ROUGH * estimate.probability, 1.0)

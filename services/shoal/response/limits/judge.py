@@ -13,8 +13,7 @@ from shoal.engines.verification import run_verified
 from shoal.errors import ComputationError, InputError
 from shoal.response.inputs import Inputs
 from shoal.response.limits.choice import get_way, probability
-from shoal.response.limits.limit import Limit
-from shoal.response.limits.margin_errors import margin_errors
+from shoal.response.limits.limit import Limit, margin_errors
 from shoal.response.limits.margins import Margins
 from shoal.response.limits.result import LimitResult, VerifiedRun
 from shoal.response.machine import ResponseModel, stable
@@ -98,7 +97,7 @@ def judge(
 ) -> LimitResult:
     """By probability where all parameters are random, by bounds of the margin where all are intervals.
 
-    Where there are both, see `response.between`. reach: bounds a model; way: one of `WAYS`; most: runs for a
+    Where there are both, see `response.assess.between`. reach: bounds a model; way: one of `WAYS`; most: runs for a
     probability. Raises InputError, ComputationError.
     """
     get_way(way)

@@ -1,22 +1,25 @@
-"""Limits, which must not be passed, and requirements, which must hold: MARKER.QUANTITY < NUMBER, or >.
+"""Limits, which must not be exceeded, and requirements, which must hold: MARKER.QUANTITY < NUMBER, or >.
 
 Of a joint, or of the whole machine as well. A limit states what must not happen, a requirement the opposite. Margins
-are positive as long as the quantity lies on the side that is required.
+are positive as long as the quantity lies on the side that is required; their errors are the distances of the second
+runs of a verified run.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 
 from shoal.engines.contract import Engine
+from shoal.engines.deviation import Deviation, by_source
+from shoal.engines.verification import Verification
+from shoal.error_budget import ErrorBudget
 from shoal.errors import InputError
-from shoal.response.limits import dynamic
-from shoal.response.limits.quantities import MARKERS, UNITS, check
+from shoal.response.limits.quantities import MARKERS, UNITS, check, engine_for, quantity_over_time, with_bodies
 from shoal.scene import Scene
 from shoal.trajectory import Array, Trajectory
 
@@ -89,11 +92,11 @@ class Limit:
 
     def scene(self, scene: Scene) -> Scene:
         """Return the scene with the markers that the margins take."""
-        return dynamic.equipped(scene, self.quantity) if self.is_dynamic else scene
+        return with_bodies(scene, self.quantity) if self.is_dynamic else scene
 
     def engine(self, engine: Engine, scene: Scene) -> Engine:
         """Return an engine whose trajectories give the margins. Raises InputError."""
-        return dynamic.asked(engine, scene, self.quantity) if self.is_dynamic else engine
+        return engine_for(engine, scene, self.quantity) if self.is_dynamic else engine
 
     def instants(self, times: Array) -> Array:
         """Return the instants of a trajectory for margins at `times` [s]: angles are counted from the start."""
@@ -116,7 +119,7 @@ class Limit:
         if not self.is_dynamic:
             return self.margin(_quantity(motion, self.place, self.quantity).T)
         try:
-            return self.margin(dynamic.along(motion, scene, values, self.quantity, self.place).T)
+            return self.margin(quantity_over_time(motion, scene, values, self.quantity, self.place).T)
         except InputError as error:
             # What mechanics says of load cells it says of channels.
             field = "require" if self.is_required else "limit"
@@ -181,3 +184,52 @@ def _quantity(motion: Trajectory, marker: str, quantity: str) -> Array:
     return np.asarray(
         np.linalg.norm(velocity, axis=1) if quantity == "speed" else velocity[:, motion.axes.index(quantity[1])]
     )
+
+
+@dataclass(frozen=True, eq=False)
+class MarginErrors:
+    """Known errors of the margins of one run.
+
+    budget: the largest over time, by source; over_time: their sum, (instants,)
+    """
+
+    budget: ErrorBudget
+    over_time: Array = field(default_factory=lambda: np.zeros(1))
+
+    @property
+    def unknown(self) -> bool:
+        """Return whether they were looked for, and one could not be estimated."""
+        return bool(self.budget.unknown)
+
+
+def margin_errors(limit: Limit, verification: Verification | None, instants: int) -> MarginErrors:
+    """Return the errors of a limit's quantity at the last instants of a run; none are known of one that failed."""
+    if verification is None:
+        return MarginErrors(ErrorBudget({}, limit.unit), np.zeros(instants))
+    bending = any(any(one.scenes[0].flexible_rods) for one in verification.deviations)
+    found = by_source(verification.deviations, lambda one: _error(limit, one, bending)[-instants:])
+    largest: dict[str, float | None] = {source: float(error.max()) for source, error in found.items()}
+    lacking = dict.fromkeys(verification.errors.unknown)
+    over_time = sum(found.values(), np.zeros(instants))
+    return MarginErrors(ErrorBudget({**lacking, **largest}, limit.unit), over_time)
+
+
+def _error(limit: Limit, deviation: Deviation, bending: bool) -> Array:
+    """Return the error of one source, (instants,). bending: whether the machine has flexible rods"""
+    motion = deviation.one
+    columns = (*motion.axes, "angle") if len(motion.axes) == 2 else tuple(motion.axes)
+    if limit.quantity in columns:
+        column = columns.index(limit.quantity)
+        return np.asarray(deviation.of_markers()[:, motion.markers.index(limit.place), column])
+    # The quantity itself, as the margins of its absolute value hide a change of sign.
+    plain = replace(limit, absolute=False, above=True, bound=0.0)
+
+    def quantity(run: Trajectory, scene: Scene) -> Array:
+        return np.asarray(plain.margins(run, scene, {})[0])
+
+    if deviation.source == "theory" and limit.is_dynamic and bending:
+        # Rigid rods tell no forces of flexible ones: what is left out is taken as the same share of the quantity.
+        if not any(deviation.scenes[0].flexible_rods):
+            return np.zeros(len(motion.times))
+        return np.asarray(deviation.factor * np.maximum.accumulate(np.abs(quantity(motion, deviation.scenes[0]))))
+    return deviation.of(quantity)

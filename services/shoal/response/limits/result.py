@@ -12,13 +12,12 @@ from scipy import special
 from shoal.error_budget import ErrorBudget
 from shoal.findings import Finding, message
 from shoal.response import findings as kinds
-from shoal.response.control import unseen
+from shoal.response.enclosure import unseen
 from shoal.response.inputs import Inputs
 from shoal.response.limits.estimate import ExceedanceEstimate
 from shoal.response.limits.exceedance import Exceedance
 from shoal.response.limits.form import DesignPoint
-from shoal.response.limits.limit import Limit
-from shoal.response.limits.margin_errors import MarginErrors
+from shoal.response.limits.limit import Limit, MarginErrors
 from shoal.trajectory import Array, plain
 
 NEARLY_SURE = 0.99

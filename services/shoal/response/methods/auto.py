@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from shoal.response.course import UnsuitableError, watch
 from shoal.response.methods import chaos, long_time, sampling
 from shoal.response.methods.bounds import bounds
+from shoal.response.methods.long_time import UnsuitableError, watch
 from shoal.response.methods.nested import nested
 from shoal.response.methods.quadrature import quadrature
 from shoal.response.methods.time_warp import TimeWarp

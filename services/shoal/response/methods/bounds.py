@@ -12,15 +12,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shoal.response import control
-from shoal.response.design import box_design
-from shoal.response.enclosure import enclosure, looked_at
+from shoal.response.design import Screened, box_design, screened
+from shoal.response.enclosure import contradicts, control_misses, enclosure, looked_at, with_controls
 from shoal.response.expansion import Expansion, fit
 from shoal.response.extremes import Extremes, extremes
 from shoal.response.polynomials import HIGHEST
 from shoal.response.regularised import Decay, likeliest, regularised, trimmed
 from shoal.response.runs import TooManyRunsError
-from shoal.response.screening import Screened, screened
 from shoal.response.study import FINE_GAP, Found, Looked, Study
 from shoal.trajectory import Array
 
@@ -74,9 +72,9 @@ def bounds(study: Study) -> Found:
     _run_signs(plan, _foretold(plan, 1))
     here, degree = _grown(plan, _round(plan, 1), 1)
     with suppress(TooManyRunsError):
-        missed = control.missed(study, here.surrogate)
-        surprising = control.contradict(study, missed, here.error) & (study.instants < horizon(study, here.gap))
-        here = replace(here, looked=control.entered(study, here.looked))
+        missed = control_misses(study, here.surrogate)
+        surprising = contradicts(study, missed, here.error) & (study.instants < horizon(study, here.gap))
+        here = replace(here, looked=with_controls(study, here.looked))
         if surprising.any():
             here = replace(here, error=study.beside(np.maximum(here.error, missed)), looked=None)
             here, _ = _grown(plan, _round(plan, degree, here.decay), degree)

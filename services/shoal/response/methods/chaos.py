@@ -12,15 +12,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from shoal.response import links, moments
-from shoal.response.degrees import best
-from shoal.response.expansion import Expansion
+from shoal.response.expansion import Expansion, choose_degree, hidden, outwards
 from shoal.response.inputs import BoolArray
-from shoal.response.links import Linked
-from shoal.response.outermost import hidden, outwards
 from shoal.response.polynomials import size
 from shoal.response.regularised import likeliest, regularised, trimmed
+from shoal.response.statistics import moment_errors
 from shoal.response.study import Found, Study
+from shoal.response.transformations import Transformed, compared, transformed, untransformed
 from shoal.trajectory import Array
 
 SHARE = 2.0
@@ -67,22 +65,22 @@ def grown(study: Study, fair: int) -> Found:
     degree = int(found.terms.sum(axis=1).max(initial=0))
     kind = "regularised " if len(found.terms) > len(runs.germs) / SHARE else ""
     why = f"{kind}polynomial chaos of degree {degree} fitted to {len(runs.germs)} runs{told.why}"
-    errors = moments.errors(study, told, lambda part: told.again(part, _fitted, _chosen))
+    errors = moment_errors(study, told, lambda part: told.again(part, _fitted, _chosen))
     return Found(why, found, told.left_out, errors=errors, linked=told if told.links else None)
 
 
-def _told(study: Study, *, more: bool) -> Linked:
+def _told(study: Study, *, more: bool) -> Transformed:
     """The expansion, with links where they are clearly better, and with more terms where it still misses something."""
     found = _chosen(study)
     wanted = shares(study, found.left_out) > CONVERGED
-    told = links.plainly(found) if study.degree else links.linked(study, found, wanted, _chosen)
+    told = untransformed(found) if study.degree else transformed(study, found, wanted, _chosen)
     if more:
-        told = links.beside(told, _with_more_terms(study, found, shares(study, told.left_out) <= CONVERGED))
+        told = compared(told, _with_more_terms(study, found, shares(study, told.left_out) <= CONVERGED))
     return told
 
 
 def _chosen(study: Study) -> Expansion:
-    return best(study, SHARE, lambda one: _reaching(study, one))
+    return choose_degree(study, SHARE, lambda one: _reaching(study, one))
 
 
 def _fitted(study: Study) -> Expansion:

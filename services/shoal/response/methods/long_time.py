@@ -1,28 +1,171 @@
-"""Bounds at long times: a surrogate of cycles, grown until it foretells runs that it has not seen.
+"""Bounds at long times: a surrogate of cycles, grown until it predicts runs that it has not seen.
 
 At long times every instant has extremal points of its own. The surrogate names them; runs there attain the bounds, and
-its error, which runs tell that it has not seen, widens the outer ones.
+its error, known from runs that it has not seen, widens the outer ones.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
+from scipy.interpolate import BSpline, make_interp_spline
 
 from shoal.errors import InputError
-from shoal.response import control
-from shoal.response.course import UnsuitableError, Watch, refuse_without_course, watch
 from shoal.response.design import box_design
+from shoal.response.enclosure import contradicts, control_misses
 from shoal.response.extremes import Surrogate
 from shoal.response.inputs import IntArray
 from shoal.response.polynomials import Terms, size, total_degree
 from shoal.response.runs import TooManyRunsError
 from shoal.response.study import FINE_GAP, SAFETY, Found, Study
 from shoal.trajectory import Array
+
+SAMPLES = 2**15
+"""Of the first run, while nothing is known of its cycles."""
+PER_TURN = 24, 48
+"""Samples between two turning points: as few and as many as are kept."""
+SPLINE_DEGREE = 7
+"""Of the splines between samples."""
+CYCLES = 3
+"""Turning points that are too few for cycles; six have to be seen."""
+EARLY = 0.25
+"""Turning points before this share of the usual distance of two are not counted: a run from rest begins with one."""
+
+
+class UnsuitableError(Exception):
+    """The motion is not what a method is made for, and why."""
+
+
+@dataclass(frozen=True)
+class Watch:
+    """How runs are watched.
+
+    times: evenly from 0 to beyond the last instant [s], (samples,); first: the run in the middle, (samples, signals);
+    signal: the one with the most even cycles; uneven: how much a cycle differs from the next, as a share; turns: its
+    turning points; germs: of all runs that were watched, (runs, parameters); courses: of these runs
+    """
+
+    study: Study
+    times: Array
+    first: Array
+    signal: int
+    uneven: float
+    turns: int
+    germs: list[Array]
+    courses: list[Array]
+
+    def follow(self, germs: Array) -> None:
+        """Watch runs at more germs. Raises as `watched` does."""
+        if not len(germs):
+            return
+        for germ, course in zip(germs, watched(self.study, germs, self.times), strict=True):
+            self.germs.append(germ)
+            self.courses.append(course)
+
+    def spread(self) -> float:
+        """How far the phase at the last instant may lie from the middle one's [rad], by the runs of a star."""
+        end, parameters = self.study.when[-1], len(self.study.inputs)
+        self.follow(np.vstack([np.eye(parameters), -np.eye(parameters)]))
+        phases = []
+        for course in self.courses[1:]:
+            turns = turning_points(self.times, spline(self.times, course[:, self.signal]))
+            if not len(turns):
+                raise UnsuitableError("some runs have no cycles")
+            phases.append(float(np.pi * np.interp(end, turns, np.arange(len(turns)))))
+        return float(np.abs(np.array(phases[:parameters]) - phases[parameters:]).sum() / 2)
+
+
+def watched(study: Study, germs: Array, times: Array) -> Array:
+    """Make these runs, keep what they say at the study's instants, give what they say at `times`.
+
+    (runs, samples, signals). Raises InputError, TooManyRunsError, ComputationError, UnsuitableError.
+    """
+    if study.over_time is None:
+        raise UnsuitableError("nothing is known of this model between its instants")
+    instants = study.when
+    every = np.union1d(times, instants)
+    answers = study.over_time(every)(study.inputs.values(germs))
+    whole = answers.values.reshape(len(germs), len(every), -1)
+    columns = whole[:, np.searchsorted(every, instants)].reshape(len(germs), -1)
+    study.runs.keep(germs, replace(answers, values=columns))
+    if not answers.good.all():
+        raise UnsuitableError(f"{len(germs) - int(answers.good.sum())} of the longer runs failed: {answers.why}")
+    return np.asarray(whole[:, np.searchsorted(every, times)])
+
+
+def watch(study: Study, stretch: float) -> Watch:
+    """Run the middle of the box `stretch` times as long as asked for, and find the signal with the most even cycles."""
+    times = np.linspace(0.0, stretch * study.when[-1], SAMPLES + 1)
+    first = watched(study, np.zeros((1, len(study.inputs))), times)[0]
+    signal, uneven, turns = _most_even(times, first)
+    least, most = PER_TURN
+    apart = len(times) / turns
+    if apart < least:
+        times = np.linspace(0.0, times[-1], least * turns + 1)
+        first = watched(study, np.zeros((1, len(study.inputs))), times)[0]
+        signal, uneven, turns = _most_even(times, first)
+        if len(times) / turns < 0.5 * least:
+            raise UnsuitableError("there are ever more cycles the closer one looks")
+    elif apart > 2 * most:
+        times, first = times[:: int(apart / most)], first[:: int(apart / most)]
+    return Watch(study, times, first, signal, uneven, turns, [np.zeros(len(study.inputs))], [first])
+
+
+def _most_even(times: Array, course: Array) -> tuple[int, float, int]:
+    """Signal, how uneven its cycles are, and its turning points."""
+    found: list[tuple[float, int, int]] = []
+    steps = np.diff(course, axis=0)
+    # Signals that hardly ever turn between their samples need no splines.
+    seen = (steps[:-1] * steps[1:] < 0).sum(axis=0)
+    turning = np.flatnonzero(seen > CYCLES)
+    if not len(turning):
+        raise UnsuitableError("the motion has too few cycles")
+    # As many samples as are kept of the one that turns most often tell the cycles of all.
+    apart = max(1, len(times) // (PER_TURN[1] * int(seen.max())))
+    times = times[::apart]
+    every = spline(times, course[::apart, turning])
+    for k, signal in enumerate(turning.tolist()):
+        turns = turning_points(times, BSpline(every.t, every.c[:, k], every.k))
+        if len(turns) >= 6:
+            cycle = np.diff(turns[::2])
+            found.append((float(np.median(np.abs(np.diff(cycle))) / cycle.mean()), signal, len(turns)))
+    if not found:
+        raise UnsuitableError("the motion has too few cycles")
+    uneven, signal, turns_there = min(found)
+    return signal, uneven, turns_there
+
+
+def spline(times: Array, values: Array) -> BSpline:
+    """Through all samples, (samples,) or (samples, signals)."""
+    return make_interp_spline(times, values, SPLINE_DEGREE)
+
+
+def turning_points(times: Array, signal: BSpline) -> Array:
+    """Where a signal is largest or smallest [s], without the one that a run from rest begins with."""
+    speed, change = signal.derivative(), signal.derivative(2)
+    v = speed(times)
+    size = np.abs(v).max()
+    turns = np.flatnonzero((v[:-1] * v[1:] < 0) & (np.maximum(np.abs(v[:-1]), np.abs(v[1:])) > 1e-9 * size))
+    low, high = times[turns], times[turns + 1]
+    at = low + (high - low) * v[turns] / (v[turns] - v[turns + 1])
+    for _ in range(3):
+        slope = change(at)
+        step = np.divide(speed(at), slope, out=np.zeros_like(at), where=slope != 0)
+        at = np.clip(at - step, low, high)
+    if len(at) > 1:
+        at = at[at > EARLY * np.median(np.diff(at))]
+    return np.asarray(at)
+
+
+def refuse_without_course(study: Study, method: str) -> None:
+    """Raises InputError where a model is known at its instants only."""
+    if study.over_time is None:
+        raise InputError(f"method: {method} follows runs over time; this model is known at its instants only")
+
 
 SHARE = 1.25
 """Runs for every term, at least; with one parameter as many as terms will do."""
@@ -108,8 +251,8 @@ def _controlled(study: Study, found: Found) -> Found:
     """With what runs all over the box say of its error. Raises TooManyRunsError."""
     assert found.surrogate is not None
     assert found.error is not None
-    missed = control.missed(study, found.surrogate)
-    if not control.contradict(study, missed, found.error).any():
+    missed = control_misses(study, found.surrogate)
+    if not contradicts(study, missed, found.error).any():
         return found
     error = np.maximum(found.error, study.largest(missed, study.runs.values))
     return replace(found, error=error, share=_share(study, error))

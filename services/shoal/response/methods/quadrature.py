@@ -13,8 +13,8 @@ from scipy.linalg import eigh_tridiagonal
 from shoal.errors import InputError
 from shoal.response.expansion import Expansion
 from shoal.response.inputs import Inputs
-from shoal.response.kept import TimeIsUpError
 from shoal.response.polynomials import Recurrence, tensor
+from shoal.response.runs import TimeIsUpError
 from shoal.response.statistics import SURE
 from shoal.response.study import Found, Study
 from shoal.trajectory import Array

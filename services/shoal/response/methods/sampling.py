@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shoal.response.indices import designs, jansen
+from shoal.response.statistics import designs, jansen
 from shoal.response.study import Found, Study
 
 COUNT = 1024

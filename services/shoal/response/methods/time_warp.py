@@ -14,10 +14,17 @@ from functools import cached_property
 
 import numpy as np
 
-from shoal.response.course import UnsuitableError, Watch, spline, turning_points
 from shoal.response.expansion import fit
 from shoal.response.inputs import Inputs, IntArray
-from shoal.response.methods.long_time import TooSlowError, at_every_instant, stated
+from shoal.response.methods.long_time import (
+    TooSlowError,
+    UnsuitableError,
+    Watch,
+    at_every_instant,
+    spline,
+    stated,
+    turning_points,
+)
 from shoal.response.polynomials import Terms
 from shoal.response.study import Found, Study
 from shoal.trajectory import Array

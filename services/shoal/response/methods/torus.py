@@ -14,10 +14,9 @@ import numpy as np
 from scipy.signal import windows
 
 from shoal.mechanics.numerics.newton import newton
-from shoal.response.course import UnsuitableError, Watch
 from shoal.response.expansion import fit
 from shoal.response.inputs import Inputs, IntArray
-from shoal.response.methods.long_time import at_every_instant, stated
+from shoal.response.methods.long_time import UnsuitableError, Watch, at_every_instant, stated
 from shoal.response.polynomials import Terms
 from shoal.response.study import Found, Study
 from shoal.trajectory import Array

@@ -15,9 +15,9 @@ from shoal.terminal import screen
 if TYPE_CHECKING:
     from shoal.response import Response
     from shoal.response.allocation import Allocation
-    from shoal.response.boxes import Boxes
     from shoal.response.limits import LimitResult
     from shoal.response.limits.result import ProbabilityBounds
+    from shoal.response.probability_boxes import ProbabilityBoxes
 
 
 def response_table(response: Response) -> None:
@@ -165,7 +165,7 @@ def _allocation(found: Allocation) -> None:
     )
 
 
-def _shares_between(response: Response, found: Boxes) -> None:
+def _shares_between(response: Response, found: ProbabilityBoxes) -> None:
     """The least and the largest of Sobol's total indices at the end, over all interval values."""
     assert found.shares is not None
     marker, axes = response.markers[-1], response.axes

@@ -1,25 +1,164 @@
 """Statistics that are known between bounds only, because some parameters are intervals: probability boxes.
 
 Ferson, Kreinovich, Ginzburg, Myers and Sentz, Constructing probability boxes and Dempster-Shafer structures, Sandia
-National Laboratories SAND2002-4015, 2003.
+National Laboratories SAND2002-4015, 2003. An expansion over intervals and random parameters has, at given interval
+values, coefficients of the random parameters' polynomials that are polynomials of the intervals; from them mean and
+standard deviation follow in closed form and quantiles by evaluation (Eldred, Swiler and Tang, Mixed aleatory-epistemic
+uncertainty quantification with stochastic expansions and optimization-based interval estimation, Reliability
+Engineering and System Safety 96, 2011).
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import product
 
 import numpy as np
 
-from shoal.response.conditional import BLOCK, Above, Conditional, Mean, Quantile, Share
 from shoal.response.expansion import Expansion
 from shoal.response.extremes import MOST_CORNERS, Each, Extremes, along, corners, extremes
-from shoal.response.inputs import BoolArray, Inputs
-from shoal.response.kept import TimeIsUpError
+from shoal.response.inputs import BoolArray, Inputs, IntArray
+from shoal.response.polynomials import Terms
+from shoal.response.runs import TimeIsUpError
 from shoal.response.statistics import DRAWN, QUANTILES
 from shoal.response.study import FINE_GAP, SAFETY, Found, Study
 from shoal.trajectory import Array
+
+BLOCK = 4_000_000
+"""Numbers that are held at once."""
+
+
+@dataclass(frozen=True)
+class Conditional:
+    """An expansion whose interval germs are given, (places, intervals)."""
+
+    expansion: Expansion
+
+    @cached_property
+    def intervals(self) -> Inputs:
+        """The parameters that are given."""
+        return self.expansion.inputs.some(~self.expansion.inputs.random)
+
+    @cached_property
+    def random(self) -> Inputs:
+        """The others."""
+        return self.expansion.inputs.some(self.expansion.inputs.random)
+
+    @cached_property
+    def _sorted(self) -> tuple[Terms, Terms, Array, IntArray]:
+        """Terms in the random germs, each once, the constant first; those in the intervals, and the coefficients, in
+        their order; where each begins.
+        """
+        random = self.expansion.inputs.random
+        different, which = np.unique(self.expansion.terms[:, random], axis=0, return_inverse=True)
+        order = np.argsort(which.ravel(), kind="stable")
+        starts = np.searchsorted(which.ravel()[order], np.arange(len(different)))
+        given: Terms = self.expansion.terms[:, ~random][order]
+        return different, given, self.expansion.coefficients[order], starts
+
+    @property
+    def terms(self) -> Terms:
+        """Degrees of the polynomials of the random germs, the constant first, (terms, random parameters)."""
+        return self._sorted[0]
+
+    def parts(self, given: Array) -> list[Array]:
+        """Coefficients of these polynomials at every place, (places, columns) each."""
+        _, terms, coefficients, starts = self._sorted
+        basis = self.intervals.basis(given, terms)
+        ends = [*starts[1:], len(terms)]
+        return [basis[:, a:b] @ coefficients[a:b] for a, b in zip(starts, ends, strict=True)]
+
+    def each(self, given: Array, columns: IntArray) -> Array:
+        """Coefficients of one column at each place, (places, terms)."""
+        _, terms, coefficients, starts = self._sorted
+        product = self.intervals.basis(given, terms) * coefficients[:, columns].T
+        return np.asarray(np.add.reduceat(product, starts, axis=1))
+
+
+@dataclass(frozen=True)
+class Mean:
+    """The mean at interval germs."""
+
+    of: Conditional
+
+    def __call__(self, germs: Array) -> Array:
+        """(places, columns)."""
+        return self.of.parts(germs)[0]
+
+    def each(self, germs: Array, columns: IntArray) -> Array:
+        """(places,)."""
+        return np.asarray(self.of.each(germs, columns)[:, 0])
+
+
+@dataclass(frozen=True)
+class Above:
+    """So many standard deviations from the mean; the deviation itself where `mean` is 0."""
+
+    of: Conditional
+    deviations: float = 1.0
+    mean: float = 0.0
+
+    def __call__(self, germs: Array) -> Array:
+        """(places, columns)."""
+        first, *others = self.of.parts(germs)
+        square = np.zeros_like(first)
+        for part in others:
+            square += part**2
+        return np.asarray(self.mean * first + self.deviations * np.sqrt(square))
+
+    def each(self, germs: Array, columns: IntArray) -> Array:
+        """(places,)."""
+        found = self.of.each(germs, columns)
+        return np.asarray(self.mean * found[:, 0] + self.deviations * np.sqrt((found[:, 1:] ** 2).sum(axis=1)))
+
+
+@dataclass(frozen=True)
+class Share:
+    """Share that some terms have of the variance of the random parameters at interval germs: a Sobol index.
+
+    counted: the terms, without the constant, (terms - 1,); nothing: a variance beside which there is none to share,
+    (columns,); other: the share that is told where that is so, (columns,)
+    """
+
+    of: Conditional
+    counted: BoolArray
+    nothing: Array
+    other: Array
+
+    def __call__(self, germs: Array) -> Array:
+        """(places, columns)."""
+        squares = np.array([part**2 for part in self.of.parts(germs)[1:]])
+        return self._share(squares[self.counted].sum(axis=0), squares.sum(axis=0), slice(None))
+
+    def each(self, germs: Array, columns: IntArray) -> Array:
+        """(places,)."""
+        squares = self.of.each(germs, columns)[:, 1:] ** 2
+        return self._share(squares[:, self.counted].sum(axis=1), squares.sum(axis=1), columns)
+
+    def _share(self, part: Array, whole: Array, columns: IntArray | slice) -> Array:
+        nothing = self.nothing[columns]
+        return np.asarray((part + nothing * self.other[columns]) / (whole + nothing))
+
+
+@dataclass(frozen=True)
+class Quantile:
+    """A quantile at interval germs, from the same random germs everywhere; drawn: basis there, (draws, terms)."""
+
+    of: Conditional
+    share: float
+    drawn: Array
+
+    def each(self, germs: Array, columns: IntArray) -> Array:
+        """(places,)."""
+        found = self.of.each(germs, columns)
+        block = max(1, BLOCK // len(self.drawn))
+        parts = [
+            np.quantile(self.drawn @ found[k : k + block].T, self.share, axis=0) for k in range(0, len(found), block)
+        ]
+        return np.concatenate(parts)
+
 
 SEARCHED = 1024
 """Places at which an expansion is evaluated while extremes of its quantiles are sought."""
@@ -29,14 +168,14 @@ ELSE = 64
 """Quasi-random ones where there are more intervals."""
 STEPS = 0.1, 0.02
 """Of the search from the best of them."""
-HOPELESS = 0.1
+BEYOND_HOPE = 0.1
 """Instants whose gap is above this share of the scatter lie beyond the horizon."""
 NOTHING = 0.01
 """Of the largest deviation: at interval values with less, the shares of that are not looked at."""
 COARSE, LITTLE = 0.05, 0.1
 """Share of a deviation above which its error calls for runs over the random parameters alone; at instants where it is
 below `LITTLE` of its largest, of that."""
-PLACES, INNER = 8, 128
+INTERVAL_VALUES, RUNS_EACH = 8, 128
 """Interval values that are looked at beyond it, and runs at each."""
 
 
@@ -63,7 +202,7 @@ class Ends:
 
 
 @dataclass(frozen=True, eq=False)
-class Boxes:
+class ProbabilityBoxes:
     """names: of the intervals; mean, std, quantiles: of every column, where those of quantiles are what the expansion
     estimates, so that only their outer bounds are to be printed; gap: the largest distance between outer bounds
     and extremes within the horizon, as a share of the scatter (the largest spread of the mean and deviation together);
@@ -94,7 +233,7 @@ def _level(share: float) -> str:
     return f"q{share:g}"
 
 
-def boxes_of(study: Study, found: Found) -> Boxes:
+def boxes_of(study: Study, found: Found) -> ProbabilityBoxes:
     """From an expansion over all parameters and its error. Raises TimeIsUpError where there is none."""
     if not isinstance(found.surrogate, Expansion) or found.error is None:
         raise TimeIsUpError
@@ -107,14 +246,16 @@ def boxes_of(study: Study, found: Found) -> Boxes:
     told = _quantiles(of, sides, error, study.seed)
     scale = scatter(study, *sides)
     gap = np.divide(error, scale, out=np.zeros_like(error), where=scale > 0)
-    first = study.instants[gap > max(study.gap or 0.0, HOPELESS)].min(initial=math.inf)
+    first = study.instants[gap > max(study.gap or 0.0, BEYOND_HOPE)].min(initial=math.inf)
     end = math.inf if math.isinf(first) else float(study.instants[study.instants < first].max(initial=0.0))
     within = gap[study.instants <= end]
     largest = float(within.max()) if within.size else math.nan
     shares = _shares(of, study, sides[1])
     shares[..., study.instants > end] = np.nan
     apart = std_gap(study, std, end)
-    return Boxes(tuple(of.intervals.names), mean, std, tuple(told), largest, end, shares=shares, std_gap=apart)
+    return ProbabilityBoxes(
+        tuple(of.intervals.names), mean, std, tuple(told), largest, end, shares=shares, std_gap=apart
+    )
 
 
 def _std_gaps(study: Study, std: Ends) -> Array:
@@ -137,7 +278,7 @@ def std_gap(study: Study, std: Ends, horizon: float) -> float:
 
 
 def _shares(of: Conditional, study: Study, std: Extremes) -> Array:
-    """Least and largest Sobol indices, see `Boxes`.
+    """Least and largest Sobol indices, see `ProbabilityBoxes`.
 
     Where the deviation is next to nothing beside its largest they are those over all interval values together.
     """
@@ -235,16 +376,16 @@ def _search(one: Each, best: Array, at: Array) -> None:
                 along(one, sign, axis, step, best[side], at[side], every)
 
 
-def sampled(study: Study, boxes: Boxes) -> Boxes:
+def sampled(study: Study, boxes: ProbabilityBoxes) -> ProbabilityBoxes:
     """Beyond the horizon: extremes over a few interval values of what runs there tell; outer bounds are not known."""
     inputs, runs = study.inputs, study.runs
     intervals, random = inputs.some(~inputs.random), inputs.some(inputs.random)
     count = len(intervals)
     unit = np.eye(count)
-    some = corners(count) if 2**count < PLACES else np.vstack([unit, -unit])
-    given = np.concatenate([np.zeros((1, count)), some])[:PLACES]
-    inner = min(INNER, runs.left // len(given))
-    if inner < INNER // 2:
+    some = corners(count) if 2**count < INTERVAL_VALUES else np.vstack([unit, -unit])
+    given = np.concatenate([np.zeros((1, count)), some])[:INTERVAL_VALUES]
+    inner = min(RUNS_EACH, runs.left // len(given))
+    if inner < RUNS_EACH // 2:
         return boxes
     drawn, made, failed = random.sobol(inner, study.seed + 3), len(runs.germs), runs.failed
     germs = np.empty((len(given) * inner, len(inputs)))

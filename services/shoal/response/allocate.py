@@ -2,8 +2,8 @@
 
 The largest probability over the intervals is what must stay below the target. In the standard normal space of the
 random parameters the margin is least, at the distance of the target's reliability index, at a place that always exists
-(`limits.inverse`). There a parameter moves the margin by its tolerance times what the place stands for, which to first
-order in the place is a share of its own, as of an interval, and one that scatters:
+(`limits.form.nearest`). There a parameter moves the margin by its tolerance times what the place stands for, which to
+first order in the place is a share of its own, as of an interval, and one that scatters:
 
     sum of pull_i s_i + beta |spread s| <= room
 
@@ -17,7 +17,8 @@ limit tells.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,20 +28,34 @@ from scipy import optimize, special
 from shoal.errors import ComputationError
 from shoal.findings import Finding, message
 from shoal.response import findings as kinds
-from shoal.response.allocation import MANY, ROUNDS, SETTLED, STEP, TIGHTEST, Allocation, passed, with_factors
-from shoal.response.between import GAP, MORE, PLACES, between
+from shoal.response.allocation import (
+    MANY,
+    ROUNDS,
+    SETTLED,
+    STEP,
+    TARGET,
+    TIGHTEST,
+    Allocation,
+    Reached,
+    accepted,
+    costs_of,
+    of_intervals,
+    passed,
+    with_factors,
+)
+from shoal.response.assess import GAP, MORE, PLACES, between, bound_margins, options
 from shoal.response.inputs import Inputs
 from shoal.response.limits import MOST, Limit, LimitResult
 from shoal.response.limits.choice import probability
 from shoal.response.limits.estimate import ExceedanceEstimate
-from shoal.response.limits.form import design_points
-from shoal.response.limits.inverse import Nearest, nearest
+from shoal.response.limits.form import Nearest, design_points, nearest
 from shoal.response.limits.judge import watched
 from shoal.response.limits.margins import FAR, Margins, least
 from shoal.response.limits.result import undecided
 from shoal.response.machine import ResponseModel
+from shoal.response.problem import UncertainProblem
 from shoal.response.respond import respond
-from shoal.response.runs import Answers
+from shoal.response.runs import Answers, TimeIsUpError
 from shoal.trajectory import Array
 
 MARGIN = 0.01
@@ -314,3 +329,32 @@ def _confirmed(
     # The index has no bound where a limit cannot be passed, and no polynomial follows it there; the margin has.
     reasons = [*largest.reasons, *undecided(min(found.between.beyond[1], beyond))]
     return Confirmed(factors, largest.estimates[0], reasons), found.evaluations
+
+
+def allocate(problem: UncertainProblem, results: Sequence[LimitResult]) -> Allocation | None:
+    """Return the cheapest tolerances that keep the limit, where they are asked for and there is time.
+
+    Raises InputError, ComputationError.
+    """
+    if problem.asked.allocate and results:
+        with suppress(TimeIsUpError):
+            return _allocated(problem, results[0])
+    return None
+
+
+def _allocated(problem: UncertainProblem, stated: LimitResult) -> Allocation:
+    """Stated: the result with the stated tolerances."""
+    limit, model, inputs, asked = stated.limit, problem.model, problem.inputs, problem.asked
+    prices, widest = costs_of(asked.cost or {}, inputs), accepted(model.scene, inputs)
+    if inputs.random.any():
+        target = TARGET if asked.target is None else asked.target
+        return of_random(limit, model, inputs, stated, target, prices, widest, **options(problem))
+    # Tolerances that keep the limit keep it by the known error of the model.
+    margins = watched(model, limit.tightened(stated.errors.total or 0.0))
+
+    def least(here: Inputs) -> Reached:
+        lower, outer, germs, evaluations, _ = bound_margins(problem, here, None)(margins, abs(limit.bound))
+        worst = int(lower.argmin())
+        return Reached(float(outer.min()), float(lower[worst]), germs[worst], evaluations)
+
+    return of_intervals(limit.required, margins, inputs, least, prices, widest)
