@@ -8,7 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
+import scipy.io
 from PIL import Image
 from shoal.scene import load_scene
 from shoal_validation.gallery import Machine, machines
@@ -34,6 +36,22 @@ def test_paper_finds_the_angles_to_the_error_of_its_mesh(example: Any, tmp_path:
     # 0.035 degrees: what a mesh of 4/8 elements is off by, as docs/validation.md says.
     assert abs(found["error"]) == pytest.approx(6.2e-4, rel=0.1)
     assert (tmp_path / "paper.png").stat().st_size > 10_000
+
+
+def test_pieces_of_a_recording_become_one_table(example: Any, tmp_path: Path) -> None:
+    pieces = {}
+    for name, axis in (("Time", 0), ("Y", 1)):
+        for use, count in (("id", 2), ("vad", 1)):
+            held = np.empty((count, 1), dtype=object)
+            for k in range(count):
+                at = 1e-3 * (np.arange(5) + 5 * (k + 2 * (use == "vad")))
+                held[k, 0] = at[:, None] if axis == 0 else np.stack([np.pi + at, np.pi - at, at, at])
+            pieces[f"{name}_{use}"] = held
+    scipy.io.savemat(tmp_path / "double.mat", pieces)
+    example("kaheman.py", "double.mat")
+    table = pd.read_csv(tmp_path / "double_1kHz.csv.gz")
+    assert list(table) == ["t", "theta1", "theta2"]
+    np.testing.assert_allclose(table, np.stack([t := 1e-3 * np.arange(15), np.pi + t, np.pi - t], axis=1), atol=1e-6)
 
 
 @pytest.mark.slow  # Kernels for the other ways to an acceleration.

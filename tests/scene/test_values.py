@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -199,3 +201,32 @@ def test_a_rigid_rod_may_count_its_height() -> None:
     slender = tapered.model_copy(update={"rotary_inertia": False})
     # The integral of rho w h^3 / 12 over the length, with h = 0.2 - 0.1 x: a mean cube of (0.2^4 - 0.1^4) / 0.4.
     assert tapered.inertia - slender.inertia == pytest.approx(1000 * 0.1 / 12 * (0.2**4 - 0.1**4) / 0.4, rel=1e-13)
+
+
+def test_ground_needs_no_point_where_only_a_direction_matters() -> None:
+    place = {"body": "ground", "point": [0.0, 0.0]}
+    rods = {name: {"kind": "rod", "length": 1.0, "height": 0.01, "width": 0.03, "density": 7850.0} for name in "AB"}
+    pins = {name: {"kind": "revolute", "first": place, "second": {"body": name}} for name in "AB"}
+
+    def scene(ground: dict[str, Any]) -> Scene:
+        return Scene.parse(
+            {
+                "name": "gears",
+                "bodies": rods,
+                "markers": {"tip": {"body": "B", "point": "end"}},
+                "joints": pins
+                | {
+                    "motor": {"kind": "driven-angle", "first": ground, "second": {"body": "A"}, "angle": "t"},
+                    "mesh": {
+                        "kind": "gear",
+                        "first": {"body": "A"},
+                        "second": {"body": "B"},
+                        "carrier": ground,
+                        "ratio": 2,
+                    },
+                },
+                "loads": {"brake": {"kind": "torque", "at": {"body": "B"}, "torque": 1.0, "reaction": ground}},
+            }
+        )
+
+    assert scene({"body": "ground"}) == scene(place)

@@ -31,6 +31,15 @@ class Attachment(Record):
     """Named point, or coordinates in the body's frame [m]; on a flexible rod the arc length and 0."""
 
 
+def _origin_of_ground(place: Any) -> Any:
+    """Return a place with the origin for its point, if it names the ground and no point of it."""
+    return {"point": (0.0, 0.0), **place} if isinstance(place, dict) and place.get("body") == GROUND else place
+
+
+Direction = Annotated[Attachment, BeforeValidator(_origin_of_ground)]
+"""An attachment of whose body only the direction matters: on the ground the point may be left out."""
+
+
 class MovingPoint(Record):
     """A point of the ground that moves."""
 
@@ -51,6 +60,15 @@ class Tie(Record):
     """Place on the first body."""
     second: Attachment
     """Place on the second body."""
+
+
+class DirectionTie(Tie):
+    """Joins the directions of two bodies, independent of the places."""
+
+    first: Direction
+    """The first body."""
+    second: Direction
+    """The second body."""
 
 
 class Resisted(Tie):
@@ -199,21 +217,21 @@ class Distance(Tie):
     """Distance [m] as a function of time; by default that of the start."""
 
 
-class Parallel(Tie):
+class Parallel(DirectionTie):
     """The directions of two bodies stay parallel."""
 
     kind: Literal["parallel"] = "parallel"
     turned: ClassVar[tuple[str, ...]] = ("first", "second")
 
 
-class Perpendicular(Tie):
+class Perpendicular(DirectionTie):
     """The directions of two bodies stay perpendicular."""
 
     kind: Literal["perpendicular"] = "perpendicular"
     turned: ClassVar[tuple[str, ...]] = ("first", "second")
 
 
-class DrivenAngle(Tie):
+class DrivenAngle(DirectionTie):
     """The angle from the first body's direction to the second's is a function of time."""
 
     kind: Literal["driven-angle"] = "driven-angle"
@@ -242,7 +260,7 @@ def _fraction(value: Any) -> Any:
     return value
 
 
-class Gear(Tie):
+class Gear(DirectionTie):
     """Gears, a belt or a chain: the second body turns `ratio` times as fast as the first, as seen from a carrier.
 
     Both axes keep their direction; where they differ, as those of bevel and worm gears, the ground carries them.
@@ -254,8 +272,8 @@ class Gear(Tie):
     """Speed of the second body over that of the first [1]: negative for gears that mesh outside, positive for belts,
     chains and ring gears; a fraction of whole numbers up to 1000, which may be text such as '-20/31'.
     """
-    carrier: Attachment = Attachment(body=GROUND, point=(0.0, 0.0))
-    """Place on the body that carries both bearings."""
+    carrier: Direction = Attachment(body=GROUND, point=(0.0, 0.0))
+    """The body that carries both bearings."""
     axis: Axis = Z
     """Axis of the first body in space, as it points at the start [1]."""
     second_axis: Axis | None = None

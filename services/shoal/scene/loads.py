@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from shoal.scene.function import Function
-from shoal.scene.joints import Attachment, Z
+from shoal.scene.joints import Attachment, Direction, Z
 from shoal.scene.record import Axis, NonNegative, Record, Vector, kinds
 
 
@@ -81,8 +81,8 @@ class Torque(Record):
     """Axis of the torque in space, as it points at the start [1]. It turns with the body of `reaction`, and is fixed
     for the ground.
     """
-    reaction: Attachment | None = None
-    """Place on the body that takes the reaction; by default the ground."""
+    reaction: Direction | None = None
+    """The body that takes the reaction; by default the ground."""
 
 
 class DistributedForce(Record):
