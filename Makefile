@@ -76,10 +76,8 @@ containers: setup  ## the compose file against its schema, the Dockerfile agains
 bench: setup  ## speed and accuracy against the other engines
 	@$(BIN)/python -m shoal_validation.benchmarks
 
-charts: setup  ## every chart and table of docs/ anew (an hour)
-	@for part in work_precision stability ablation inverse_precision selection uncertain gallery; do \
-	  echo "== $$part"; $(BIN)/python -m shoal_validation.$$part; \
-	done
+charts: setup  ## every chart and table of docs/ again (hours; ARGS=--list, ARGS="--only NAME", ARGS="--since DATE")
+	@$(BIN)/python -m shoal_validation.renew $(ARGS)
 
 docs: setup  ## the documentation as pages, in site/
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet

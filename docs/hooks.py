@@ -16,13 +16,16 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 
-def on_page_markdown(markdown: str, **_: Any) -> str:
+def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
     """Put what is generated where a page has the mark for it."""
+    from shoal_validation.renew import measured_table
+
     marks = {
         "<!-- commands -->": commands,
         "<!-- findings -->": findings,
         "<!-- gallery -->": gallery,
         "<!-- scene fields -->": scene_fields,
+        "<!-- measured -->": lambda: measured_table(page.file.src_uri),
     }
     for mark, generate in marks.items():
         markdown = markdown.replace(mark, generate()) if mark in markdown else markdown

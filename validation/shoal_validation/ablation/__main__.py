@@ -1,7 +1,7 @@
 """`python -m shoal_validation.ablation [--only NAME] [--quick | --draw] [--out FOLDER]`: both ablations.
 
 Writes ablation-dynamics.png, ablation-inverse.png and their numbers, ablation.json, into FOLDER (docs/charts), and the
-tables into identification-charts.md beside that folder, if there is one. About ten minutes; quick: one; only: one of
+tables into swarm-charts.md beside that folder, if there is one. About ten minutes; quick: one; only: one of
 the two anew; draw: from the JSON that is there.
 """
 
@@ -41,7 +41,7 @@ def main(arguments: list[str]) -> None:
     report.draw_dynamics(stepped, chosen.out / "ablation-dynamics.png")
     report.draw_inverse(searched, chosen.out / "ablation-inverse.png")
     tables = {"ablation-dynamics": report.dynamics_table(stepped), "ablation-inverse": report.inverse_table(searched)}
-    publish(chosen.out.parent / "identification-charts.md", tables)
+    publish(chosen.out.parent / "swarm-charts.md", tables)
 
 
 def _measure(quick: bool, which: list[str]) -> dict[str, Any]:

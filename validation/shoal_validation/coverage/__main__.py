@@ -1,7 +1,7 @@
 """`python -m shoal_validation.coverage [--seeds N] [--page FILE]`.
 
 Refits the rigid double pendulum to N data sets (200) that differ in their noise, each from the truth, and counts how
-often the 95 % intervals contain it. The table goes to standard output and into docs/identification-charts.md. Takes
+often the 95 % intervals contain it. The table goes to standard output and into docs/verdict-charts.md. Takes
 about two minutes.
 """
 
@@ -70,7 +70,7 @@ def main(arguments: list[str]) -> None:
     """Measure and write."""
     parser = argparse.ArgumentParser(prog="python -m shoal_validation.coverage", description=__doc__)
     parser.add_argument("--seeds", type=int, default=200)
-    parser.add_argument("--page", type=Path, default=Path("docs/identification-charts.md"))
+    parser.add_argument("--page", type=Path, default=Path("docs/verdict-charts.md"))
     chosen = parser.parse_args(arguments)
     rows = [
         (

@@ -2,7 +2,7 @@
 
 Draws from the posterior of the rigid double pendulum for N data sets (100) that differ in their noise, and counts how
 often the central 95 % contain the truth, which is that of scipy's solution of Lagrange's equations. The table, with the
-effective draws a minute of processor time, goes to standard output and into docs/identification-charts.md. --record
+effective draws a minute of processor time, goes to standard output and into docs/verdict-charts.md. --record
 keeps every data set in a file, so that the study goes on where it was stopped. Takes half an hour.
 """
 
@@ -66,7 +66,7 @@ def main(arguments: list[str]) -> None:
     parser = argparse.ArgumentParser(prog="python -m shoal_validation.coverage.posterior", description=__doc__)
     parser.add_argument("--seeds", type=int, default=100)
     parser.add_argument("--record", type=Path, help="file of the data sets that are done")
-    parser.add_argument("--page", type=Path, default=Path("docs/identification-charts.md"))
+    parser.add_argument("--page", type=Path, default=Path("docs/verdict-charts.md"))
     chosen = parser.parse_args(arguments)
     each = {f"{case.name} {seed}": (case, seed) for case in cases() for seed in range(chosen.seeds)}
     found = dict(resumed(list(each), lambda key: asdict(counted(*each[key])), chosen.record))

@@ -4,7 +4,7 @@ Draws N (200) rigid machines in the plane at random, records each by an IMU of E
 find mass, inertia and friction from 2 s of it, beginning up to 40 % beside them. Counts how often the 95 % intervals of
 what is called right contain the truth, and names the machines of which something wrong was called right. --record keeps
 every machine in a file, so that the study goes on where it was stopped. The table goes to standard output and into
-docs/identification-charts.md. Takes an hour.
+docs/verdict-charts.md. Takes an hour.
 """
 
 from __future__ import annotations
@@ -115,7 +115,7 @@ def main(arguments: list[str]) -> None:
     parser = argparse.ArgumentParser(prog="python -m shoal_validation.coverage.sensors", description=__doc__)
     parser.add_argument("--seeds", type=int, default=200)
     parser.add_argument("--record", type=Path, help="file of the machines that are done")
-    parser.add_argument("--page", type=Path, default=Path("docs/identification-charts.md"))
+    parser.add_argument("--page", type=Path, default=Path("docs/verdict-charts.md"))
     chosen = parser.parse_args(arguments)
     seeds = [str(seed) for seed in range(chosen.seeds)]
     found = [Trial(**one) for _, one in resumed(seeds, lambda seed: asdict(trial(int(seed))), chosen.record)]

@@ -42,7 +42,7 @@ def main(arguments: list[str]) -> None:
             with chosen.file.open("a") as file:
                 file.write(json.dumps(asdict(found)) + "\n")
     head, rows, told = summary(list(trials.values()))
-    print("\n".join([table(head, rows), *told] if rows else told))
+    print("\n\n".join([table(head, rows), *told] if rows else told))
 
 
 if __name__ == "__main__":

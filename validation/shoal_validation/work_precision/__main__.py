@@ -1,6 +1,6 @@
 """`python -m shoal_validation.work_precision`: measures every method on every problem, and renews charts and tables.
 
-A whole run writes data and pictures to docs/charts, and the tables of docs/accuracy-and-speed.md (in the plane) and of
+A whole run writes data and pictures to docs/charts, and the tables of docs/accuracy-figures.md (in the plane) and of
 docs/accuracy-in-space.md.
 """
 
@@ -30,7 +30,7 @@ GROUPS: dict[str, dict[str, tuple[str, ...]]] = {
 }
 """Pictures of rigid machines by page, and what they hold; an empty one has all others."""
 PAGES = {
-    "plane": ("work-precision", "accuracy-and-speed.md"),
+    "plane": ("work-precision", "accuracy-figures.md"),
     "space": ("work-precision-space", "accuracy-in-space.md"),
 }
 """Name of the data and of the marks in the page, and the page."""

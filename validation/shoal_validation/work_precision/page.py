@@ -1,4 +1,4 @@
-"""The tables of docs/accuracy-and-speed.md, from the data of one run."""
+"""The tables of docs/accuracy-figures.md, from the data of one run."""
 
 from __future__ import annotations
 
