@@ -102,13 +102,13 @@ def prefect(answers: dict[str, Any]) -> Iterator[str]:
         (NIGHT, [], False, "a schedule and no scheduled night"),
         (NIGHT | {"paused": True}, COMING, False, "is off"),
         (NIGHT | {"schedules": [{"active": False}]}, [], False, "is off"),
-        (None, [], False, "has no deployment nightly/validation"),
+        (None, [], False, "has no deployment nightly/night"),
     ],
 )
 def test_nights_that_never_come_are_found(night: dict[str, Any] | None, coming: list[Any], ok: bool, word: str) -> None:
     answers = {"/api/health": True, "/api/flow_runs/filter": coming}
     if night is not None:
-        answers["/api/deployments/name/nightly/validation"] = night
+        answers["/api/deployments/name/nightly/night"] = night
     with prefect(answers) as address:
         check = doctor.check_nights(address)
     assert check.ok == ok

@@ -165,7 +165,7 @@ def check_nights(address: str) -> Check:
     if not _answers(f"{api}/health"):
         return Check(what, True, f"no Prefect server at {api}; none are scheduled")
     try:
-        deployment = _asked(f"{api}/deployments/name/nightly/validation")
+        deployment = _asked(f"{api}/deployments/name/nightly/night")
         future = {
             "expected_start_time": {"after_": datetime.now(UTC).isoformat()},
             "state": {"type": {"any_": ["SCHEDULED"]}},
@@ -178,12 +178,12 @@ def check_nights(address: str) -> Check:
         )
     except HTTPError as error:
         if error.code == 404:
-            return Check(what, False, f"{api} has no deployment nightly/validation", "state it: make up")
+            return Check(what, False, f"{api} has no deployment nightly/night", "state it: make up")
         return Check(what, False, f"{api} does not tell: HTTP status {error.code}", "look at the server's output")
     except (URLError, OSError, ValueError):
         return Check(what, False, f"{api} does not tell", "look at the server's output")
     if deployment["paused"] or not any(schedule["active"] for schedule in deployment["schedules"]):
-        return Check(what, False, "the schedule of nightly/validation is off", "switch it on, on Prefect's pages")
+        return Check(what, False, "the schedule of nightly/night is off", "switch it on, on Prefect's pages")
     if not coming:
         advice = (
             "wait a minute after make up; then look at the server's output for what ends its scheduler (make setup)"

@@ -86,7 +86,7 @@ def test_a_machine_of_ones_own_is_typed_into_the_form(desk: Any, visit: Callable
     wanted = {"flow_runs": {"name": {"any_": ["forward own"]}}}
     for mass, state in (("2.0", "COMPLETED"), ("-1.0", "FAILED")):
         page.goto(f"{desk.at['PREFECT']}/deployments")
-        page.get_by_role("link", name="forward").first.click()
+        page.get_by_role("link", name="simulate").first.click()
         page.get_by_role("button", name="Run", exact=True).first.click()
         page.get_by_text("Custom run").click()
         field = page.locator("textarea").first

@@ -39,7 +39,7 @@ def until(true: Callable[[], Any], what: str) -> Any:
 
 def nights(prefect: str) -> list[dict[str, Any]]:
     """The nights that are scheduled, in the order of their times, as soon as there are any."""
-    night = call(f"{prefect}/api/deployments/name/nightly/validation")["id"]
+    night = call(f"{prefect}/api/deployments/name/nightly/night")["id"]
     wanted = {
         "deployments": {"id": {"any_": [night]}},
         "flow_runs": {"state": {"type": {"any_": ["SCHEDULED"]}}},
@@ -134,5 +134,5 @@ def fails_aloud(home: Path) -> None:
 
 def slots_taken(prefect: str) -> int:
     """How many nights run, as far as Prefect knows."""
-    limit = call(f"{prefect}/api/deployments/name/nightly/validation")["global_concurrency_limit"]
+    limit = call(f"{prefect}/api/deployments/name/nightly/night")["global_concurrency_limit"]
     return int(call(f"{prefect}/api/v2/concurrency_limits/{limit['id']}")["active_slots"])

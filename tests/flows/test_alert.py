@@ -38,7 +38,7 @@ def prefect(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     try:
         _answers(f"{address}/api/ready", server, log)
         flow = call(f"{address}/api/flows/", {"name": "nightly"})["id"]
-        call(f"{address}/api/deployments/", {"name": "validation", "flow_id": flow})
+        call(f"{address}/api/deployments/", {"name": "night", "flow_id": flow})
         call(f"{address}/api/deployments/", {"name": "another", "flow_id": flow})
         yield address
     finally:
@@ -68,7 +68,7 @@ def told(prefect: str, address: str) -> None:
     subprocess.run([sys.executable, "-c", program, address], env=environment, check=True, timeout=PATIENCE)
 
 
-def night(prefect: str, name: str, kind: str = "COMPLETED", deployment: str = "validation") -> None:
+def night(prefect: str, name: str, kind: str = "COMPLETED", deployment: str = "night") -> None:
     """A night that ends so."""
     found = call(f"{prefect}/api/deployments/name/nightly/{deployment}")["id"]
     run = call(f"{prefect}/api/deployments/{found}/create_flow_run", {"name": "nightly validation"})

@@ -61,8 +61,8 @@ def test_forms_offer_every_scene_engine_and_method(flows: Any) -> None:
 @pytest.mark.parametrize(
     ("name", "right", "wrong"),
     [
-        ("forward", {"scene": "bodies:\n  OA: 1"}, {"scene": 1}),
-        ("select", {"scene": "arm.yaml", "tolerance": 0.01}, {"tolerance": 0}),
+        ("simulate", {"scene": "bodies:\n  OA: 1"}, {"scene": 1}),
+        ("tolerance", {"scene": "arm.yaml", "tolerance": 0.01}, {"tolerance": 0}),
         ("statics", {"time": 1.5, "tolerance": 1e-3, "set": {"gravity": [0, 0]}}, {"time": -1}),
         ("export", {"to": ["mjcf", "fmu", "nc"], "parameter": ["gravity.1"], "verify": False}, {"to": ["step"]}),
         ("identify", {"problem": "a: 1\nb: 2", "data": "http://gauss:8001/v1/library/recordings/run"}, {"seeds": []}),
@@ -70,8 +70,8 @@ def test_forms_offer_every_scene_engine_and_method(flows: Any) -> None:
         ("design", {"about": "start", "noise": 1e-3, "parameter": "theta1", "rate": None}, {"about": "noon"}),
         ("design", {"data": "run", "duration": 2}, {"noise": -1}),
         ("compare", {"engines": ["gauss", "casadi"]}, {"engines": ["gauss"]}),
-        ("sensitivity", {"vary": [{"path": "gravity", "low": 0, "high": 1, "count": 2}]}, {"vary": []}),
-        ("validation", {"only": "library/arm", "quick": True}, {"quick": "perhaps"}),
+        ("sweep", {"vary": [{"path": "gravity", "low": 0, "high": 1, "count": 2}]}, {"vary": []}),
+        ("night", {"only": "library/arm", "quick": True}, {"quick": "perhaps"}),
     ],
 )
 def test_forms_take_what_is_right_and_no_more(
@@ -94,7 +94,7 @@ def test_every_flow_has_a_deployment(flows: Any) -> None:
 def test_what_the_form_does_not_offer_is_for_the_flow_to_refuse() -> None:
     """An entry of the library that is younger than the deployment, YAML, a recording's path."""
     strict = {name for name, stated in DEPLOYMENTS.items() if stated.get("enforce_parameter_schema", True)}
-    assert strict == {"validation"}
+    assert strict == {"night"}
 
 
 @pytest.mark.slow
@@ -115,11 +115,11 @@ def test_forms_offer_the_names_of_the_library(tmp_path: Path) -> None:
 
 
 def test_nights_do_not_pile_up(flows: Any) -> None:
-    night = DEPLOYMENTS["validation"]
+    night = DEPLOYMENTS["night"]
     assert night["concurrency_limit"] == {"limit": 1, "collision_strategy": "CANCEL_NEW"}
     assert [schedule["cron"] for schedule in night["schedules"]] == ["0 2 * * *"]
     flow = flows["nightly"]
     assert flow.retries == 1
     assert flow.timeout_seconds == 3600
-    queues = {one["work_pool"]["work_queue_name"] for name, one in DEPLOYMENTS.items() if name != "validation"}
+    queues = {one["work_pool"]["work_queue_name"] for name, one in DEPLOYMENTS.items() if name != "night"}
     assert night["work_pool"]["work_queue_name"] not in queues

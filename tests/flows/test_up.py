@@ -59,7 +59,7 @@ def undisturbed(measurement: Measurement) -> dict[str, Fit]:
 
 def check(at: Mapping[str, str]) -> None:
     """A deployment runs, shows its table, its end and its run in MLflow, and what MLflow has of it."""
-    run = run_deployment(at["PREFECT"], "forward/forward", {"scene": "single-pendulum"})
+    run = run_deployment(at["PREFECT"], "forward/simulate", {"scene": "single-pendulum"})
     assert run["state_type"] == "COMPLETED"
     shown = artifacts_of(at["PREFECT"], run)
     assert shown["progress"] == 100.0
@@ -99,9 +99,9 @@ def check_schedules(prefect: str) -> dict[str, object]:
     seen = doctor.check_nights(f"{prefect}/api")
     assert seen.ok
     assert seen.found.startswith(f"3 scheduled, the next at {times[0]}; no worker takes it")
-    automate(prefect, "compare/compare", after="forward/forward")
-    waiting = begin(prefect, "nightly/validation", {})
-    scheduled = comes_by_itself(prefect, "forward/forward", {"scene": "single-pendulum"})
+    automate(prefect, "compare/compare", after="forward/simulate")
+    waiting = begin(prefect, "nightly/night", {})
+    scheduled = comes_by_itself(prefect, "forward/simulate", {"scene": "single-pendulum"})
     comes_late(prefect, waiting)
     return scheduled
 
@@ -151,7 +151,7 @@ def test_nights_that_nobody_ran_are_not_made_up_for(tmp_path: Path) -> None:
     """Thirty wait for the worker: one runs, the others are cancelled at once."""
     short = {"only": "four-bar-2", "quick": True}
     with running(tmp_path, "--with", "nightly", *WITHOUT) as at:
-        waiting = [begin(at["PREFECT"], "nightly/validation", short) for _ in range(30)]
+        waiting = [begin(at["PREFECT"], "nightly/night", short) for _ in range(30)]
         states = Counter(ended(at["PREFECT"], run)["state_type"] for run in waiting)
     assert states == {"COMPLETED": 1, "CANCELLED": 29}
     assert len(list((tmp_path / "validation").glob("night-*.json"))) == 1
@@ -163,7 +163,7 @@ def test_a_night_that_was_broken_off_does_not_block_the_next(tmp_path: Path) -> 
     short = {"only": "four-bar-2", "quick": True}
 
     def holds_the_slot(prefect: str) -> None:
-        night = begin(prefect, "nightly/validation", {})
+        night = begin(prefect, "nightly/night", {})
         until(lambda: call(f"{prefect}/api/flow_runs/{night['id']}")["state_type"] == "RUNNING", "the night runs")
         assert slots_taken(prefect) == 1
 
@@ -172,11 +172,11 @@ def test_a_night_that_was_broken_off_does_not_block_the_next(tmp_path: Path) -> 
         assert kill(tmp_path, "shoal_flows.prefect_server") >= 1
         assert kill(tmp_path, "prefect.engine") >= 1
         until(lambda: slots_taken(at["PREFECT"]) == 0, "the slot is free")
-        assert run_deployment(at["PREFECT"], "nightly/validation", short)["state_type"] == "COMPLETED"
+        assert run_deployment(at["PREFECT"], "nightly/night", short)["state_type"] == "COMPLETED"
         holds_the_slot(at["PREFECT"])
     with running(tmp_path, "--with", "nightly", *WITHOUT, settings=OFTEN) as at:
         until(lambda: slots_taken(at["PREFECT"]) == 0, "the slot is free")
-        night = comes_by_itself(at["PREFECT"], "nightly/validation", short)
+        night = comes_by_itself(at["PREFECT"], "nightly/night", short)
         assert ended(at["PREFECT"], night)["state_type"] == "COMPLETED"
     assert len(list((tmp_path / "validation").glob("night-*.json"))) == 2
 

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from uuid import UUID
 
 NAME = "A night is not as it should be"
-NIGHT = "nightly/validation"
+NIGHT = "nightly/night"
 BLOCK = "shoal-alert"
 STATES = ("Not to be trusted", "Failed", "TimedOut", "Crashed", "Late")
 """Of a night: its lines, the flow, its hour, its process; one that nobody ran is late."""
