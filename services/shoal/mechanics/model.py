@@ -24,6 +24,7 @@ from shoal.mechanics.derived import Derived
 from shoal.mechanics.forces import LAW, STIFFNESS, Forces
 from shoal.mechanics.frames import Frame, ModalFrame
 from shoal.mechanics.functions import Functions, Piecewise
+from shoal.mechanics.independent import independent_rows
 from shoal.mechanics.numerics import alike, sparse
 from shoal.mechanics.numerics.alike import Alike
 from shoal.mechanics.numerics.row_pairs import paired
@@ -211,29 +212,19 @@ class Model:
     @cached_property
     def _saddle(self) -> Saddle:
         """The sparse saddle point problem."""
-        none, count = np.zeros(0, dtype=np.int64), self.constraints.size
-        if count == 0 or (count <= saddle.FEW and self._redundant):
-            return Saddle(0, 0, False, _EMPTY, none, np.zeros((0, 1)), none, none)
-        pattern, slots, place, entries = saddle.analyse(self.unknowns, self._factored, self.constraints)
+        none, c = np.zeros(0, dtype=np.int64), self.constraints
+        rows: Index | None = np.arange(c.size)
+        if 0 < c.size <= saddle.FEW:
+            rows = independent_rows(c, self.derived, self.q0[:, 0])
+        if c.size == 0 or rows is None:
+            return Saddle(0, 0, False, _EMPTY, 0, none, none, np.zeros((0, 1)), 0, none, none, none)
+        pattern, slots, place, entries = saddle.analyse(self.unknowns, self._factored, c, rows)
         multiplier = np.zeros(len(place), dtype=np.int64)
         multiplier[place[self.unknowns :]] = 1
-        base = scatter(pattern, slots, self._factored)
-        return Saddle(len(place), pattern.slots, count > saddle.SMALL, pattern, place, base, entries, multiplier)
-
-    @property
-    def _redundant(self) -> bool:
-        """Return whether some constraints depend on others at the start of the first lane."""
-        c, d, first = self.constraints, self.derived, self.q0[:, 0]
-        of_row = np.repeat(np.arange(len(d.constant)), np.diff(d.start))
-        parts = np.bincount(of_row, d.coefficient[:, 0] * first[d.source], len(d.constant))
-        state = np.concatenate([first, d.constant[:, 0] + parts])
-        known = np.where(c.source < 0, 1.0, state[c.source])
-        entries = np.bincount(c.target, c.coefficient[:, 0] * known, len(c.column))
-        slope = np.zeros((c.size, self.unknowns))
-        slope[np.repeat(np.arange(c.size), np.diff(c.entry)), c.column] = entries
-        lengths = np.linalg.norm(slope, axis=1, keepdims=True)
-        size = np.linalg.svd(slope / np.where(lengths > 0, lengths, 1.0), compute_uv=False)
-        return c.size > self.unknowns or bool(size[-1] < _DEPENDENT)
+        base, many = scatter(pattern, slots, self._factored), c.size > saddle.SMALL and len(rows) == c.size
+        entry = np.concatenate([np.arange(c.entry[k], c.entry[k + 1]) for k in rows])
+        numbers = len(rows), rows, place, base, len(entry), entry, entries
+        return Saddle(len(place), pattern.slots, many, pattern, *numbers, multiplier)
 
     @cached_property
     def _alike(self) -> Alike:
@@ -312,8 +303,6 @@ REFINEMENTS = 4
 """Each leaves the part `masses.THIN` of what there was to take back, so that round-off is left."""
 _SINGULAR = 1e14
 """Mass that a coordinate moves over what others do not move already: beyond it is round-off."""
-_DEPENDENT = 1e-7
-"""Smallest singular value of the constraints' unit rows below which some depend on others."""
 _EMPTY, _ = sparse.analyse(0, [])
 
 

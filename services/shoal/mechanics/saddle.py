@@ -27,10 +27,10 @@ from shoal.mechanics.numerics.tile import Array, Index, Tile
 SMALL = 16
 """Up to so many constraints the orthogonal projection is used near singular positions, where it is more accurate."""
 FEW = 64
-"""Up to so many it is used everywhere if some depend on others: without a choice of pivots the row that is left out
-stays the same one, and where the motion brings its part in the dependence near zero, those kept look singular."""
-REGULAR = 1e-2
-"""Pivot against its first value above which a position is far from singular ones, and few digits are lost."""
+"""Up to so many those that depend on others are left out of the problem, see `independent`."""
+REGULAR = 1e-4
+"""Pivot against its first value, the square of a distance from singular, above which factors lose at most four digits;
+what they leave of a gap is closed with them again."""
 SINGULAR = 1e-10
 """Pivot against its first value below which a row counts as dependent in an acceleration: 1e-5 from singular."""
 SETTLED = 1e-6
@@ -40,27 +40,36 @@ SETTLED = 1e-6
 class Saddle(NamedTuple):
     """Pattern of the factor and where its numbers come from; empty (size 0) where rows depend on others at the start.
 
-    many: whether there are too many constraints for the projection, even near singular positions. place: position of
-    every coordinate, then of every multiplier. base: the mass matrix in the pattern, (slots, lanes); slot: of every
-    entry of the Jacobian. multiplier: whether a position is that of a multiplier.
+    many: whether there are too many constraints for the projection, even near singular positions. rows: number of
+    constraints in the problem; row: their numbers. place: position of every coordinate, then of the multipliers of
+    these. base: the mass matrix in the pattern, (slots, lanes). entries: number of the Jacobian's entries in the
+    problem; entry: their numbers; slot: their slots. multiplier: whether a position is that of a multiplier.
     """
 
     size: int
     slots: int
     many: bool
     pattern: sparse.Pattern
+    rows: int
+    row: Index
     place: Index
     base: Array
+    entries: int
+    entry: Index
     slot: Index
     multiplier: Index
 
 
 class SaddleWork(NamedTuple):
-    """Work space: the factor (slots, lanes), a right-hand side (size, lanes) and a number: see `factor`."""
+    """Work space: the factor (slots, lanes), a right-hand side (size, lanes) and numbers.
+
+    weak: see `factor`. opened: whether a constraint that was left out as redundant has turned out not to be.
+    """
 
     values: Array
     x: Array
     weak: Array
+    opened: Array
 
 
 def order(unknowns: int, entries: Iterable[tuple[int, int]], rows: list[list[int]]) -> list[int]:
@@ -107,13 +116,14 @@ def order(unknowns: int, entries: Iterable[tuple[int, int]], rows: list[list[int
 
 
 def analyse(
-    unknowns: int, mass: Collection[tuple[int, int]], constraints: Constraints
+    unknowns: int, mass: Collection[tuple[int, int]], constraints: Constraints, numbers: Index
 ) -> tuple[sparse.Pattern, dict[tuple[int, int], int], Index, Index]:
-    """Pattern, slots of the mass matrix's entries, places of all unknowns and slots of the Jacobian's entries."""
-    rows = [
-        constraints.column[constraints.entry[k] : constraints.entry[k + 1]].tolist() for k in range(constraints.size)
-    ]
-    place = np.empty(unknowns + constraints.size, dtype=np.int64)
+    """Pattern, slots of the mass matrix's entries, places of all unknowns and slots of the Jacobian's entries.
+
+    numbers: of the constraints in the problem
+    """
+    rows = [constraints.column[constraints.entry[k] : constraints.entry[k + 1]].tolist() for k in numbers]
+    place = np.empty(unknowns + len(rows), dtype=np.int64)
     place[order(unknowns, mass, rows)] = np.arange(len(place))
 
     def key(i: int, j: int) -> tuple[int, int]:
@@ -127,9 +137,7 @@ def analyse(
 
 
 @njit(cache=True, error_model="numpy")
-def factor(
-    tile: Tile, s: Saddle, entries: int, jacobian: Array, w: SaddleWork, tolerance: float, closeness: Array
-) -> int:
+def factor(tile: Tile, s: Saddle, jacobian: Array, w: SaddleWork, tolerance: float, closeness: Array) -> int:
     """Factor the problem for a Jacobian (entries, lanes); returns how many rows were left out in some lane.
 
     The factors are solved with by `sparse.solve`, the right-hand side ordered by place. They serve for the removal of
@@ -137,8 +145,8 @@ def factor(
     `eliminate`.
     """
     simd.assign(w.values, s.base, s.slots * len(tile))
-    for e in range(entries):
-        copy(tile, w.values, s.slot[e], jacobian, e)
+    for e in range(s.entries):
+        copy(tile, w.values, s.slot[e], jacobian, s.entry[e])
     dropped, weak = eliminate(tile, s.pattern, s.multiplier, w.values, tolerance, closeness)
     w.weak[0] = max(dropped, weak)
     return dropped  # type: ignore[no-any-return]
@@ -185,4 +193,4 @@ def _by_coordinates(tile: Tile, p: sparse.Pattern, multiplier: Index, values: Ar
 
 def room(size: int, slots: int, width: int) -> SaddleWork:
     """Work space as arrays."""
-    return SaddleWork(np.zeros(slots * width), np.zeros(size * width), np.zeros(1))
+    return SaddleWork(np.zeros(slots * width), np.zeros(size * width), np.zeros(1), np.zeros(1))

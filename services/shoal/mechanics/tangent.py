@@ -71,13 +71,14 @@ def tangent_tile(model: Model, tile: Tile, lanes: slice, *, held: bool = False) 
     curved = _curvatures(model)
     entries |= {key for key, *_ in curved}
     if held and model.constraints.size:
-        pattern, slot, place, jacobian = saddle.analyse(model.unknowns, entries, model.constraints)
+        rows = np.arange(model.constraints.size)
+        pattern, slot, place, jacobian = saddle.analyse(model.unknowns, entries, model.constraints, rows)
         multiplier = np.zeros(pattern.size, dtype=np.int64)
         multiplier[place[model.unknowns :]] = 1
-        rows = Held(place, jacobian, multiplier)
+        constrained = Held(place, jacobian, multiplier)
     else:
         pattern, slot = sparse.analyse(model.unknowns, entries)
-        rows = Held(*(np.zeros(0, dtype=np.int64),) * 3)
+        constrained = Held(*(np.zeros(0, dtype=np.int64),) * 3)
     source: Index = np.full(pattern.slots, 2 * blocks)
     extra = []
     for key, row, c in found:
@@ -105,7 +106,7 @@ def tangent_tile(model: Model, tile: Tile, lanes: slice, *, held: bool = False) 
         pack(stacked([c for *_, c in curved]), lanes, tile),
         kernels.family_pointers("stiffness", tile, model.elements),
         kernels.family_pointers("damping", tile, model.elements),
-        rows,
+        constrained,
     )
 
 

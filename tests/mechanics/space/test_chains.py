@@ -34,7 +34,9 @@ def chain(count: int, kind: str, **more: Any) -> Scene:
 def work(count: int, kind: str) -> Any:
     """Entries of the factor, and of the constraints' derivatives."""
     model = build(chain(count, kind))
-    pattern = saddle.analyse(model.unknowns, model.mass_entries, model.constraints)[0]
+    pattern = saddle.analyse(model.unknowns, model.mass_entries, model.constraints, np.arange(model.constraints.size))[
+        0
+    ]
     return np.array([len(pattern.row), model.constraints.parts, model.unknowns])
 
 

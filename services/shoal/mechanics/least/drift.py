@@ -46,7 +46,24 @@ def project(
     ready: whether the accelerations at q have just been found by the projection, whose directions are at hand.
     Where no position closes the constraints, as no drive beyond the reach of the joints does, the motion ends.
     """
-    factored, before, now = ready and m.saddle.size > 0 and w.saddle.weak[0] == 0.0, np.inf, 0.0
+    factored, now = _close(tile, m, w, t, q, tolerance, iterations, ready and w.saddle.weak[0] == 0.0)
+    if now > SMALL and factored and m.saddle.rows < m.constraints.size:
+        w.saddle.opened[0] = 1.0
+        factored, now = _close(tile, m, w, t, q, tolerance, iterations, False)
+    if now > SMALL:
+        _leave_open(tile, m, w, t, q, v)
+    _project_rates(tile, m, w, t, q, v, tolerance, factored)
+
+
+@njit(cache=True, error_model="numpy")
+def _close(
+    tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, tolerance: float, iterations: int, ready: bool
+) -> tuple[bool, float]:
+    """Move q onto C = 0; returns whether there are factors of a place near q, and the largest gap before the last move.
+
+    ready: whether there are at the beginning
+    """
+    factored, before, now = ready and m.saddle.size > 0, np.inf, 0.0
     for _ in range(iterations):
         derive(tile, m.derived, q, m.unknowns, m.held_rows, False)
         constraints.residual(tile, m.constraints, m.functions, t, q, w.gap)
@@ -58,9 +75,7 @@ def project(
             factored = _prepare(tile, m, w)
         _correct(tile, m, w, q, tolerance, factored)
         before = now
-    if now > SMALL:
-        _leave_open(tile, m, w, t, q, v)
-    _project_rates(tile, m, w, t, q, v, tolerance, factored)
+    return factored, now
 
 
 @njit(cache=True, error_model="numpy")
@@ -115,11 +130,9 @@ def _largest(tile: Tile, m: Arrays, w: GaussWork) -> float:
 @njit(cache=True, error_model="numpy")
 def _prepare(tile: Tile, m: Arrays, w: GaussWork) -> bool:
     """Take the directions of `_correct` from C_q in w.jacobian; whether they are factors of `saddle`."""
-    if m.saddle.size > 0:
-        c = m.constraints
+    if m.saddle.size > 0 and w.saddle.opened[0] == 0.0:
         tolerance = saddle.SETTLED if m.saddle.many else saddle.REGULAR
-        entries = c.entry[c.size]
-        if saddle.factor(tile, m.saddle, entries, w.jacobian, w.saddle, tolerance, w.closeness) == 0 or m.saddle.many:
+        if saddle.factor(tile, m.saddle, w.jacobian, w.saddle, tolerance, w.closeness) == 0 or m.saddle.many:
             return True
     rows(tile, m, w)
     return False

@@ -20,6 +20,11 @@ STILL = 1e-9
 """A third derivative below this part of what its velocities could make it is none."""
 
 
+REDUNDANT = 1e-5
+"""Remainder of a redundant constraint's equation, as a part of its terms: stages of a step are that far off the closed
+machine, and the projection counts a row as dependent from there, too."""
+
+
 @njit(cache=True, error_model="numpy")
 def solve(tile: Tile, m: Arrays, w: GaussWork, load: Array, gap: Array, out: Array, multiplier: Array) -> None:
     """[M C_q'; C_q 0] [out; multiplier] = [load; -gap] with the factors in w.saddle."""
@@ -27,42 +32,73 @@ def solve(tile: Tile, m: Arrays, w: GaussWork, load: Array, gap: Array, out: Arr
     n = m.unknowns
     for i in range(n):
         copy(tile, room.x, s.place[i], load, i)
-    for k in range(m.constraints.size):
-        clear(tile, room.x, s.place[n + k])
-        subtract(tile, room.x, s.place[n + k], gap, k)
+    for j in range(s.rows):
+        clear(tile, room.x, s.place[n + j])
+        subtract(tile, room.x, s.place[n + j], gap, s.row[j])
     sparse.solve(tile, s.pattern, room.values, room.x, 0)
     for i in range(n):
         copy(tile, out, i, room.x, s.place[i])
-    for k in range(m.constraints.size):
-        copy(tile, multiplier, k, room.x, s.place[n + k])
+    if s.rows < m.constraints.size:
+        for k in range(m.constraints.size):
+            clear(tile, multiplier, k)
+    for j in range(s.rows):
+        copy(tile, multiplier, s.row[j], room.x, s.place[n + j])
     for _ in range(m.refinements):  # see `lent`
         for i in range(n):
             copy(tile, w.moved, i, room.x, s.place[i])
         sparse.multiply(tile, m.pattern, m.lent, w.moved, w.lent)
         for i in range(n):
             copy(tile, room.x, s.place[i], w.lent, i)
-        for k in range(m.constraints.size):
-            clear(tile, room.x, s.place[n + k])
+        for j in range(s.rows):
+            clear(tile, room.x, s.place[n + j])
         sparse.solve(tile, s.pattern, room.values, room.x, 0)
         for i in range(n):
             add(tile, out, i, room.x, s.place[i])
-        for k in range(m.constraints.size):
-            add(tile, multiplier, k, room.x, s.place[n + k])
+        for j in range(s.rows):
+            add(tile, multiplier, s.row[j], room.x, s.place[n + j])
 
 
 @njit(cache=True, error_model="numpy")
 def constrain(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array, a: Array) -> bool:
     """See `principle.constrain`; C_q and eta are in w. Whether it is done: not for few constraints near singular."""
-    c = m.constraints
-    entries = c.entry[c.size]
+    if w.saddle.opened[0] > 0.0:
+        return False
     tolerance = saddle.SINGULAR if m.saddle.many else saddle.REGULAR
-    dropped = saddle.factor(tile, m.saddle, entries, w.jacobian, w.saddle, tolerance, w.closeness)
+    dropped = saddle.factor(tile, m.saddle, w.jacobian, w.saddle, tolerance, w.closeness)
     if dropped > 0 and not m.saddle.many:
         return False
+    if m.saddle.rows < m.constraints.size:
+        for i in range(m.unknowns):
+            copy(tile, w.extra, i, a, i)
     solve(tile, m, w, a, w.gap, a, w.multiplier)
+    if m.saddle.rows < m.constraints.size and not _satisfies_left_out(tile, m, w, a):
+        for i in range(m.unknowns):
+            copy(tile, a, i, w.extra, i)
+        return False
     clear(tile, w.near, 0)
     if dropped > 0:
         _add_dropped(tile, m, w, t, q, v, a)
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def _satisfies_left_out(tile: Tile, m: Arrays, w: GaussWork, a: Array) -> bool:
+    """Return whether an acceleration satisfies the constraints that were left out as well: C_q a = -eta."""
+    width, c = len(tile), m.constraints
+    for lane in range(width):
+        largest, kept = 0.0, 0
+        for i in range(lane, m.unknowns * width, width):
+            largest = max(largest, abs(a[i]))
+        for k in range(c.size):
+            if kept < m.saddle.rows and m.saddle.row[kept] == k:
+                kept += 1
+                continue
+            rest, size = w.gap[k * width + lane], abs(w.gap[k * width + lane])
+            for e in range(c.entry[k], c.entry[k + 1]):
+                rest += w.jacobian[e * width + lane] * a[c.column[e] * width + lane]
+                size += abs(w.jacobian[e * width + lane]) * largest
+            if abs(rest) > REDUNDANT * size:
+                return False
     return True
 
 
