@@ -46,7 +46,7 @@ def rows(model: Model) -> Any:
     return independent_rows(model.constraints, model.derived, model.q0[:, 0])
 
 
-@pytest.mark.parametrize("scene", [cranks(), load_scene("bricard").with_values({"solver.step": 1e-3})], ids=["cranks", "bricard"])
+@pytest.mark.parametrize("scene", [cranks(), load_scene("bricard")], ids=["cranks", "bricard"])
 def test_a_machine_moves_as_by_the_projection_on_all_its_constraints(
     monkeypatch: pytest.MonkeyPatch, scene: Scene
 ) -> None:

@@ -20,8 +20,8 @@ from shoal.response.methods.nested import resolved
 from shoal.response.probability_boxes import ProbabilityBoxes, boxes_of, sampled
 from shoal.response.problem import UncertainProblem
 from shoal.response.runs import CachedModel, Model, TimeIsUpError, TooManyRunsError
-from shoal.response.statistics import QUANTILES, Statistics, either, masked, of_expansion, of_runs
 from shoal.response.statistics import DRAWN as PLACES
+from shoal.response.statistics import QUANTILES, Statistics, either, masked, of_expansion, of_runs
 from shoal.response.study import Found, LinkedMoments, Study
 from shoal.trajectory import Array
 
