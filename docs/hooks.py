@@ -47,14 +47,20 @@ def on_page_content(html: str, **_: Any) -> str:
 def findings() -> str:
     """Return the tables of all kinds of findings, one for each analysis."""
     from shoal.identification import findings as identification
+    from shoal.mechanics import findings as motions
     from shoal.mechanics.analysis import findings as statics
+    from shoal.mechanics.analysis import modes_findings as modes
+    from shoal.mechanics.analysis import reaction_findings as reactions
     from shoal.response import findings as response
 
     return "\n\n".join(
         [
             f"## Identification\n\n{_kinds(identification, 'verdict')}",
             f"## Uncertain parameters\n\n{_kinds(response, 'status')}",
+            f"## Motions\n\n{_kinds(motions, 'status')}",
             f"## Statics\n\n{_kinds(statics, 'status')}",
+            f"## Modes and Campbell diagrams\n\n{_kinds(modes, 'status')}",
+            f"## Joint reactions\n\n{_kinds(reactions, 'status')}",
         ]
     )
 

@@ -14,10 +14,11 @@ from shoal.errors import InputError
 from shoal.exported import TOOLS, export
 from shoal.fmu.export import export as export_unit
 from shoal.fmu.running import identifier
+from shoal.json_values import plain
 from shoal.pictures import files
 from shoal.requests.fmu import Fmu
 from shoal.scene import Scene
-from shoal.trajectory import Trajectory, plain
+from shoal.trajectory import Trajectory
 from shoal.whole import file_name
 
 FMU = "fmu"

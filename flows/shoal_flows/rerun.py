@@ -103,7 +103,7 @@ def rerun(run_id: str) -> Repeated:
 def main(run_id: str, as_json: bool) -> str:
     """Print what `rerun` found; returns its complaint."""
     from rich.console import Console
-    from shoal.trajectory import json_text
+    from shoal.json_values import json_text
 
     repeated = rerun(run_id)
     if as_json:

@@ -8,11 +8,12 @@ from typing import Any, Generic, Protocol, TypeVar
 from shoal.engines.compare import Comparison
 from shoal.engines.sweep import Sweep
 from shoal.identification.design import Design
+from shoal.json_values import plain
 from shoal.mechanics.analysis.equilibrium import Equilibrium
 from shoal.response import Response
 from shoal.scene import Scene
 from shoal.selection import Selection
-from shoal.trajectory import Trajectory, plain
+from shoal.trajectory import Trajectory
 
 from shoal_flows.exports import Exports
 from shoal_flows.jobs import Fit

@@ -25,7 +25,7 @@ def main(name: str, parameters: Mapping[str, Any], as_json: bool) -> list[str]:
         result = run_flow(name, parameters)
     notice()
     if as_json:
-        from shoal.trajectory import json_text
+        from shoal.json_values import json_text
 
         print(json_text(result.to_json()))  # noqa: T201 - this is the output
     else:

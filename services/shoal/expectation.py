@@ -71,7 +71,7 @@ def _question(scene: Scene, expected: Expectation, document: Path) -> Question:
     def away(trajectory: Trajectory) -> float:
         theirs = other.simulate(scene, times)
         if not theirs.ok:
-            raise ComputationError(f"{expected.engine}: {theirs.message}")
+            raise ComputationError(f"{expected.engine}: {theirs.explanation}")
         return trajectory.distance(theirs)
 
     return Question(scene, times, expected.engine, error=away)

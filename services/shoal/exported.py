@@ -71,7 +71,7 @@ def _compared(tool: Tool, scene: Scene) -> float:
     ours = get_engine("gauss").simulate(scene)
     for motion in (theirs, ours):
         if not motion.ok:
-            raise ComputationError(f"{scene.name}: {motion.message}; --no-verify writes the file all the same")
+            raise ComputationError(f"{scene.name}: {motion.explanation}; --no-verify writes the file all the same")
     return ours.distance(theirs)
 
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any, TypeVar
 
-from shoal.trajectory import plain
+from shoal.json_values import plain
 
 Order = TypeVar("Order", bound=StrEnum)
 
@@ -66,9 +66,15 @@ class Finding:
         return self.kind.severity
 
     def to_json(self) -> dict[str, Any]:
-        """Return code, severity, text, numbers and what to do."""
-        said = {"code": self.code, "severity": str(self.severity), "text": self.text}
+        """Return code, severity, the status it implies, text, numbers and what to do."""
+        said = {"code": self.code, "severity": str(self.severity), "implies": self.kind.implies, "text": self.text}
         return {**said, "numbers": plain(self.numbers), "do": steps([self])}
+
+    @classmethod
+    def from_json(cls, said: Mapping[str, Any]) -> Finding:
+        """Return the finding that `to_json` wrote; its kind is known by its code, severity and implied status."""
+        kind = Kind(said["code"], Severity(said["severity"]), "", "", said["implies"])
+        return cls(kind, said["text"], tuple(said["do"]), said["numbers"])
 
 
 def message(findings: Iterable[Finding]) -> str:
@@ -81,6 +87,12 @@ def steps(findings: Iterable[Finding]) -> list[str]:
     all_ = list(findings)
     found = [step for one in all_ for step in one.steps] + [one.kind.remedy for one in all_ if one.kind.remedy]
     return list(dict.fromkeys(found))
+
+
+def explained(findings: Iterable[Finding]) -> str:
+    """Return findings as one line with what to do about them, for an error that is raised."""
+    all_ = list(findings)
+    return "; ".join(filter(None, (message(all_), *steps(all_))))
 
 
 def worst_implied(findings: Iterable[Finding], order: type[Order]) -> Order:
@@ -99,7 +111,7 @@ def sentence(text: str) -> str:
 class Concluded:
     """Base of answers that have findings: what follows from these."""
 
-    findings: list[Finding]
+    findings: Sequence[Finding]
 
     @property
     def codes(self) -> list[str]:
@@ -115,3 +127,8 @@ class Concluded:
     def advice(self) -> list[str]:
         """Steps to take next."""
         return steps(self.findings)
+
+    @property
+    def explanation(self) -> str:
+        """The findings and the steps to take next in one line."""
+        return explained(self.findings)

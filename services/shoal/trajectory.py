@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +13,8 @@ import numpy.typing as npt
 
 from shoal.error_budget import ErrorBudget
 from shoal.errors import InputError
+from shoal.findings import Concluded, Finding, explained, worst_implied
+from shoal.json_values import plain
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -34,7 +36,7 @@ class Status(StrEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class Trajectory:
+class Trajectory(Concluded):
     """Motion of one or more lanes (scenes that differ in numbers only), sampled at `times`.
 
     times: sampling instants [s], (samples,)
@@ -42,7 +44,8 @@ class Trajectory:
     points: marker positions [m], (samples, markers, d, lanes), d the dimensions of the scene, named by `axes`
     angles: direction of the body (of a cable: of its tangent) at each marker [rad],
         continuous in time, (samples, markers, lanes)
-    status: one per lane; message: why the first lane that is not ok is not
+    lane_findings: what was found out about each lane, from which `status`, `message` and `advice` follow; empty where
+        nothing was found out about any
     energy_drift: largest |E(t) + dissipated - E(0)| relative to the largest kinetic energy plus
         the size of the elastic one, (lanes,)
     constraint_drift: largest violation of a position constraint, relative to the machine's size, (lanes,)
@@ -55,7 +58,6 @@ class Trajectory:
     states: coordinates and rates at `times`, of runs of the native engine that were asked for them, else None
     changes: what each lane uses in place of what is stated of its start, as `model["initial_changes"]` tells it of a
         single one; empty of a single lane, and where the engine does not tell it
-    reasons: why each lane is not ok, empty for one that is; none where the engine tells `message` only
     """
 
     engine: str
@@ -63,19 +65,32 @@ class Trajectory:
     markers: tuple[str, ...]
     points: Array
     angles: Array
-    status: tuple[Status, ...]
     energy_drift: Array
     constraint_drift: Array
     steps: int
     wall_s: float
-    message: str = ""
+    lane_findings: Sequence[Sequence[Finding]] = ()
     model: dict[str, Any] = field(default_factory=dict)
     velocities: Array | None = None
     rates: Array | None = None
     end: Mapping[str, Any] | None = None
     states: Any = None
     changes: Sequence[Mapping[str, Any]] = ()
-    reasons: tuple[str, ...] = ()
+
+    @cached_property
+    def status(self) -> tuple[Status, ...]:
+        """The status of each lane, which follows from what was found out about it."""
+        if not self.lane_findings:
+            return (Status.OK,) * self.lanes
+        return tuple(worst_implied(one, Status) if one else Status.OK for one in self.lane_findings)
+
+    @property
+    def findings(self) -> Sequence[Finding]:  # type: ignore[override]
+        """The findings about the first lane that is not ok, else about the first that has any."""
+        if not self.lane_findings:
+            return ()
+        first = next((k for k, one in enumerate(self.status) if one is not Status.OK), None)
+        return next(filter(None, self.lane_findings), ()) if first is None else self.lane_findings[first]
 
     @property
     def axes(self) -> str:
@@ -85,12 +100,12 @@ class Trajectory:
     @property
     def lanes(self) -> int:
         """Number of scenes simulated side by side."""
-        return len(self.status)
+        return int(self.points.shape[-1])
 
     @property
     def ok(self) -> bool:
         """Return whether every lane may be believed."""
-        return all(status is Status.OK for status in self.status)
+        return not self.lane_findings or all(status is Status.OK for status in self.status)
 
     @property
     def errors(self) -> ErrorBudget:
@@ -102,10 +117,8 @@ class Trajectory:
         return f"Trajectory({', '.join(self.markers)}; {len(self.times)} samples, {self.engine}, {what})"
 
     def reason(self, lane: int) -> str:
-        """Why a lane is not ok; empty if it is."""
-        if self.status[lane] is Status.OK:
-            return ""
-        return self.reasons[lane] if self.reasons else self.message
+        """Return why a lane is not ok, and what to do; empty if it is."""
+        return "" if self.status[lane] is Status.OK else explained(self.lane_findings[lane])
 
     def changed(self, lane: int = 0) -> Mapping[str, Any]:
         """What of its stated start a lane does not keep: body -> quantity -> stated, used, unit."""
@@ -160,6 +173,8 @@ class Trajectory:
         return {
             "status": str(self.status[lane]),
             "message": self.message,
+            "advice": self.advice,
+            "findings": [one.to_json() for one in self.findings],
             "engine": self.engine,
             "markers": {
                 name: {
@@ -178,23 +193,3 @@ class Trajectory:
             "model": self.model,
             **({} if self.end is None else {"end": dict(self.end)}),
         }
-
-
-def plain(values: Any) -> Any:
-    """Numbers as JSON can hold them: lists and floats, null for what is not finite."""
-    if isinstance(values, Mapping):
-        return {key: plain(value) for key, value in values.items()}
-    if isinstance(values, list | tuple):
-        return [plain(value) for value in values]
-    if isinstance(values, np.ndarray):
-        return plain(values.tolist())
-    if isinstance(values, np.generic):
-        return plain(values.item())
-    if isinstance(values, float):
-        return values if np.isfinite(values) else None
-    return values
-
-
-def json_text(data: Any, *, indent: int | None = None) -> str:
-    """One JSON value; numbers as `plain` makes them."""
-    return json.dumps(plain(data), allow_nan=False, indent=indent)

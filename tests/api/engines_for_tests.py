@@ -13,7 +13,7 @@ from shoal.compile import clock
 from shoal.engines import ENGINES
 from shoal.engines.contract import Capabilities, sampling_times
 from shoal.scene import Scene
-from shoal.trajectory import Array, Status, Trajectory
+from shoal.trajectory import Array, Trajectory
 
 NAME = "obedient"
 
@@ -59,7 +59,6 @@ class Obedient:
             markers=tuple(scene.markers),
             points=np.full((shape[0], shape[1], 2, lanes), number),
             angles=np.zeros(shape),
-            status=(Status.OK,) * lanes,
             energy_drift=np.zeros(lanes),
             constraint_drift=np.zeros(lanes),
             steps=1,

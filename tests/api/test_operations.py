@@ -24,8 +24,8 @@ from shoal.api.tasks import told
 from shoal.client import Client
 from shoal.engines.sweep import Sweep
 from shoal.errors import ComputationError, InputError
+from shoal.json_values import json_text, plain
 from shoal.scene import Scene
-from shoal.trajectory import json_text, plain
 
 JSON = {"Content-Type": "application/json"}
 SCENE = "rigid-double-pendulum"

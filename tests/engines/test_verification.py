@@ -88,10 +88,10 @@ def test_another_engine_that_is_far_off_is_said_to_differ_and_by_how_much() -> N
     ours, other = gauss.simulate(scene, times), gauss.simulate(scene.with_values({"gravity.0": 3.0}), times)
     found = verify(replace(other, engine="other", model={"unknowns": 1}), scene)
     assert found.error("time") == pytest.approx(ours.distance(other), rel=1e-6)
-    stated = f"{ours.distance(other):.2g} m"
-    assert found.complaint.startswith(f"other differs from the native solver by about {stated}: ")
-    assert "\n" not in found.complaint
-    assert verify(ours, scene).complaint == ""
+    (finding,) = found.findings
+    assert finding.code == "differs-from-native"
+    assert finding.numbers["error"] == pytest.approx(ours.distance(other), rel=1e-6)
+    assert verify(ours, scene).findings == []
 
 
 def test_no_second_run_that_takes_too_long(monkeypatch: pytest.MonkeyPatch) -> None:

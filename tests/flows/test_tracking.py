@@ -14,6 +14,7 @@ from shoal.errors import InputError
 from shoal.identification import Measurement
 from shoal.identification.recording.reading import read
 from shoal.identification.recording.source import Channel, FileSource
+from shoal.mechanics.findings import OUT_OF_REACH
 from shoal.pictures.signals import signals
 from shoal.trajectory import Status, Trajectory
 from shoal_flows import pictures
@@ -114,7 +115,7 @@ def test_comparison_and_sweep_are_logged(client: Any, comparison: Comparison, sw
 
 
 def rejected(motion: Trajectory) -> Trajectory:
-    return replace(motion, status=(Status.OUT_OF_REACH,), message="a marker is 31 m away")
+    return replace(motion, lane_findings=[[OUT_OF_REACH.found("a marker is 31 m away")]])
 
 
 def test_what_is_rejected_says_so_and_tells_no_places(client: Any, comparison: Comparison, sweep: Sweep) -> None:

@@ -8,8 +8,9 @@ import pytest
 from shoal.engines import get_engine
 from shoal.engines.contract import Capabilities, Engine
 from shoal.identification.forward import ForwardModel
+from shoal.mechanics.findings import NOT_FINITE
 from shoal.scene import Scene
-from shoal.trajectory import Array, Status, Trajectory
+from shoal.trajectory import Array, Trajectory
 
 Fails = Callable[[Mapping[str, Array]], Array]
 
@@ -42,8 +43,9 @@ class Watched:
         self.ends += [float(times[-1])] * len(found.status)
         failed = np.broadcast_to(self.fails(values), len(found.status))
         self.failures += int(np.sum(failed))
-        pairs = zip(found.status, failed, strict=True)
-        return replace(found, status=tuple(Status.DIVERGED if bad else status for status, bad in pairs))
+        before = found.lane_findings or [[] for _ in found.status]
+        pairs = zip(before, failed, strict=True)
+        return replace(found, lane_findings=[[NOT_FINITE.found("made to")] if bad else one for one, bad in pairs])
 
 
 @pytest.fixture

@@ -237,8 +237,9 @@ def test_rods_that_bend_far_are_not_believed() -> None:
     found = verified(get_engine("gauss"), Scene.parse(PENDULUM).with_values({**soft, "solver.duration": 0.5}))
     error = found.model["verification"]["bending_error"]
     assert error > 0.05
-    assert "that modal rods bend more than a little is worth" in found.message
-    assert "use element: ancf-cable" in Verification(ErrorBudget({"bending": error}), 5.0 * error).complaint
+    assert found.codes == ["bends-far"]
+    (finding,) = Verification(ErrorBudget({"bending": error}), 5.0 * error).findings
+    assert (finding.code, finding.numbers["error"]) == ("bends-too-far", error)
 
 
 def test_a_rod_that_turns_faster_than_it_vibrates_flies_apart_and_is_told_why() -> None:

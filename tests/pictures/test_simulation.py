@@ -17,13 +17,13 @@ from PIL import Image
 from shoal.cli import main
 from shoal.engines import get_engine
 from shoal.errors import ComputationError
+from shoal.mechanics.findings import ENERGY
 from shoal.pictures import simulation
 from shoal.pictures.inline import html, plot
 from shoal.pictures.motion import plain_motion, scene_motion
 from shoal.pictures.outline import ground
 from shoal.pictures.poses import poses
 from shoal.scene import load_scene, scene_names
-from shoal.trajectory import Status
 
 COMPILES = "flyball-governor"
 """Its implicit integrator takes a minute to compile in space."""
@@ -101,7 +101,7 @@ def test_pictures_of_a_rejected_run_tell_no_places() -> None:
     """On a page and in a notebook as on the terminal; their titles told where the last marker ended."""
     scene = load_scene("single-pendulum").with_values({"solver.duration": 0.1})
     motion = get_engine("gauss").simulate(scene)
-    wrong = replace(motion, status=(Status.ENERGY,), message="energy is off")
+    wrong = replace(motion, lane_findings=[[ENERGY.found("energy is off")]])
     moving = simulation.moved(motion, scene)
     for run, said in ((motion, False), (wrong, True)):
         told = [one.figure.get_suptitle().replace("\n", " ") for one in simulation.drawn(run, scene, moving)]

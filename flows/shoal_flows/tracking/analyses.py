@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from shoal.identification.design import Design
+from shoal.json_values import json_text
 from shoal.mechanics.analysis.equilibrium import Equilibrium
 from shoal.pictures.design import design as draw_design
 from shoal.pictures.style import png
 from shoal.selection import Selection
-from shoal.trajectory import json_text
 
 from shoal_flows.exports import Exports
 from shoal_flows.tracking.engines import log_errors, log_motion_of, stated
@@ -42,7 +42,7 @@ def log_selection(found: Selection, album: Mapping[str, bytes]) -> str:
     file. Returns its id.
     """
     scene = found.chosen.scene
-    tags = {"kind": "selection", "scene": scene.name}
+    tags = {"kind": "selection", "scene": scene.name, "findings": ", ".join(found.trajectory.codes)}
     with open_run("Selection", f"{scene.name} · select", description=scene.description, tags=tags) as run:
         run.judge(*verdict(found))
         log_motion_of(run, scene, found.trajectory, found)

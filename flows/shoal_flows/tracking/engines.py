@@ -8,6 +8,7 @@ from typing import Any
 from shoal.engines.compare import Comparison
 from shoal.engines.sweep import Sweep
 from shoal.error_budget import ErrorBudget
+from shoal.json_values import json_text
 from shoal.pictures.choice import tells_places
 from shoal.pictures.engines import engines
 from shoal.pictures.files import rows
@@ -15,7 +16,7 @@ from shoal.pictures.style import png
 from shoal.pictures.sweep import sweep as draw_sweep
 from shoal.scene import Scene
 from shoal.selection import Selection
-from shoal.trajectory import Trajectory, json_text
+from shoal.trajectory import Trajectory
 
 from shoal_flows.tracking.model.files import as_yaml
 from shoal_flows.tracking.motion import log_ends, log_motion, tip
@@ -41,7 +42,8 @@ def log_comparison(comparison: Comparison, picture: bytes | None = None) -> str:
         study.picture(shown, "engines.png")
         study.text(json_text(comparison.differences(), indent=1), "differences.json")
         for name, motion in comparison.trajectories.items():
-            with open_run("Comparison", name, tags={"kind": "engine", "scene": scene.name}, parent=study.run_id) as run:
+            tags = {"kind": "engine", "scene": scene.name, "findings": ", ".join(motion.codes)}
+            with open_run("Comparison", name, tags=tags, parent=study.run_id) as run:
                 run.judge(*verdict(motion))
                 log_motion_of(run, scene, motion)
         return study.run_id
@@ -49,7 +51,7 @@ def log_comparison(comparison: Comparison, picture: bytes | None = None) -> str:
 
 def log_forward(scene: Scene, motion: Trajectory, album: Mapping[str, bytes]) -> str:
     """One run; album: pictures by the name of their file. Returns its id."""
-    tags = {"kind": "forward", "scene": scene.name}
+    tags = {"kind": "forward", "scene": scene.name, "findings": ", ".join(motion.codes)}
     name = f"{scene.name} · {motion.engine}"
     with open_run("Forward", name, description=scene.description, tags=tags) as run:
         run.judge(*verdict(motion))

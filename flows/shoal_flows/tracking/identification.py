@@ -8,10 +8,10 @@ from contextlib import contextmanager
 
 import numpy as np
 from shoal.identification import Estimate, Measurement
+from shoal.json_values import json_text
 from shoal.pictures.signals import signals
 from shoal.pictures.study import best_of as best_name
 from shoal.scene import Rod
-from shoal.trajectory import json_text
 
 from shoal_flows.jobs import Cell, Fit
 from shoal_flows.pictures import Album

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from shoal.trajectory import json_text
+from shoal.json_values import json_text
 from shoal_validation.nightly.result import Night
 
 from shoal_flows.tracking.store import open_run

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from shoal.json_values import json_text
 from shoal.response import Response
-from shoal.trajectory import json_text
 
 from shoal_flows.tracking.engines import log_errors
 from shoal_flows.tracking.model.files import as_yaml

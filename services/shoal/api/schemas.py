@@ -30,6 +30,8 @@ class Motion(BaseModel):
     times [s]: (samples,); points: marker positions [m], (samples, markers, 2, lanes); angles [rad]: (samples, markers,
     lanes); velocities [m/s] and rates [rad/s] likewise, null where the engine does not return them
     status, energy_drift, constraint_drift: one per lane; steps: time steps; wall_s: of the computation
+    findings: what was found out about each lane, empty where nothing was about any; message, advice: of the first lane
+    that is not ok
     model: what was computed; its `verification` holds the estimated errors [m], of lanes the largest of a few of them
     selection: with a tolerance, how the model was found; end: of one scene, the final state, from which a run can go on
     reasons, changes: one per lane, where lanes were requested: why it is not ok (empty if it is), and the values
@@ -50,6 +52,8 @@ class Motion(BaseModel):
     steps: int
     wall_s: float
     message: str
+    advice: list[str]
+    findings: list[list[dict[str, Any]]]
     model: dict[str, Any]
     selection: dict[str, Any] | None = None
     end: dict[str, Any] | None = None

@@ -24,10 +24,12 @@ from shoal.engines.verification import verified
 from shoal.errors import InputError
 from shoal.identification.methods import get_method
 from shoal.identification.recording.source import FileSource
+from shoal.json_values import plain
+from shoal.mechanics import findings as kinds
 from shoal.mechanics.analysis.joint_reactions import to_json as reactions_to_json
 from shoal.requests.request import read
 from shoal.scene import Scene
-from shoal.trajectory import Trajectory, plain
+from shoal.trajectory import Trajectory
 from shoal.wire import packed
 
 Note = Callable[[Any], None]
@@ -139,7 +141,10 @@ def _simulated(bench: Bench, request: Simulate, scene: Scene, bounded: bool, not
         if asked.verify:
             checked = spot_check(engine, scene, values, found.status, found.times)
             model = {**found.model, "errors": checked.errors.to_json(), "verification": checked.to_json()}
-            found = replace(found, model=model, message=found.message or checked.complaint)
+            found = replace(found, model=model)
+            if checked.complaint and found.ok:
+                first = [kinds.POINT_REJECTED.found(checked.complaint)]
+                found = replace(found, lane_findings=[first, *([] for _ in range(1, found.lanes))])
     if bounded:
         check_end(found, scene)
     return _motion(request, found)
@@ -153,8 +158,9 @@ def _motion(request: Simulate, trajectory: Trajectory, selection: dict[str, Any]
         name: None if (array := getattr(trajectory, name)) is None else np.ascontiguousarray(array)
         for name in ("times", "points", "angles", "velocities", "rates", "energy_drift", "constraint_drift")
     }
-    same = ("engine", "markers", "status", "steps", "wall_s", "message", "model")
+    same = ("engine", "markers", "status", "steps", "wall_s", "message", "advice", "model")
     stated = {name: getattr(trajectory, name) for name in same}
+    stated["findings"] = [[one.to_json() for one in lane] for lane in trajectory.lane_findings]
     if request.lanes is not None:
         each = range(trajectory.lanes)
         stated["reasons"] = [trajectory.reason(lane) for lane in each]

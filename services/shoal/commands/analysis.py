@@ -51,7 +51,7 @@ def modes(asked: Modes, as_json: bool, out: Out) -> None:
     if out is not None:
         files.modes(found, out)
     screen.show(found.to_json(), as_json, lambda: tables.modes_table(found))
-    check_trusted(found.ok, found.verdict[1])
+    check_trusted(found.ok, found.message)
 
 
 @command("reactions")

@@ -17,8 +17,9 @@ from shoal.engines.verification import verify as errors_of
 from shoal.engines.verification import with_errors
 from shoal.error_budget import ErrorBudget
 from shoal.errors import InputError
+from shoal.json_values import plain
 from shoal.scene import Scene
-from shoal.trajectory import Array, Trajectory, plain
+from shoal.trajectory import Array, Trajectory
 
 COMPARED = ("gauss", "exudyn", "casadi", "tree")
 """Four derivations of the same equations. The first three that can run a scene are compared unless others are named."""
@@ -49,7 +50,7 @@ class Comparison:
     @property
     def complaint(self) -> str:
         """Return why `ok` is false, every reason in one line; empty if it is true."""
-        wrong = {name: motion.message for name, motion in self.trajectories.items() if not motion.ok}
+        wrong = {name: motion.explanation for name, motion in self.trajectories.items() if not motion.ok}
         said = [f"{name} refuses the scene: {reason}" for name, reason in self.refused.items()]
         said += [f"{name}: {reason}" for name, reason in wrong.items()]
         if len(self.trajectories) < 2 and not self.refused:

@@ -11,8 +11,9 @@ import numpy as np
 from shoal.engines.capabilities import require
 from shoal.engines.contract import Engine, check_lanes, sampling_times
 from shoal.errors import InputError
+from shoal.mechanics import findings as kinds
 from shoal.scene import Scene
-from shoal.trajectory import Array, Status, Trajectory
+from shoal.trajectory import Array, Trajectory
 
 
 class OneByOne:
@@ -58,12 +59,11 @@ def _refused(engine: Engine, scene: Scene, wanted: Array, message: str) -> Traje
         markers=tuple(scene.markers),
         points=np.full((*shape, scene.dimensions, 1), np.nan),
         angles=np.full((*shape, 1), np.nan),
-        status=(Status.REFUSED,),
         energy_drift=np.full(1, np.nan),
         constraint_drift=np.full(1, np.nan),
         steps=0,
         wall_s=0.0,
-        message=message,
+        lane_findings=[[kinds.REFUSED.found(message)]],
     )
 
 
@@ -89,14 +89,12 @@ def _side_by_side(runs: Sequence[Trajectory], wall_s: float) -> Trajectory:
         angles=together([run.angles for run in runs]),
         velocities=known([run.velocities for run in runs]),
         rates=known([run.rates for run in runs]),
-        status=tuple(run.status[0] for run in runs),
         energy_drift=np.concatenate([run.energy_drift for run in runs]),
         constraint_drift=np.concatenate([run.constraint_drift for run in runs]),
         steps=max(run.steps for run in runs),
         wall_s=wall_s,
-        message=next((f"lane {lane}: {run.message}" for lane, run in enumerate(runs) if not run.ok), ""),
+        lane_findings=[run.findings for run in runs],
         model=next((run.model for run in runs if run.model), {}),
         states=first,
         changes=[run.changed() for run in runs],
-        reasons=tuple(run.reason(0) for run in runs),
     )

@@ -24,8 +24,9 @@ from httpx_retries import Retry, RetryTransport
 from shoal.arguments import numbers
 from shoal.engines.contract import Capabilities
 from shoal.errors import ComputationError, InputError
+from shoal.findings import Finding
 from shoal.scene import Scene
-from shoal.trajectory import Array, Status, Trajectory
+from shoal.trajectory import Array, Trajectory
 
 RETRIES = 6
 """After a connection that failed, a full queue, a proxy without a service: 0.25 s, 0.5 s, ... up to 8 s apart."""
@@ -180,11 +181,11 @@ def _files_of(found: dict[str, Any]) -> dict[str, bytes]:
 
 def trajectory_of(found: dict[str, Any]) -> Trajectory:
     """The motion that a service answers, to the last bit."""
-    plain: dict[str, Any] = {name: found[name] for name in ("engine", "steps", "wall_s", "message", "model")}
+    plain: dict[str, Any] = {name: found[name] for name in ("engine", "steps", "wall_s", "model")}
     arrays: dict[str, Any] = {name: np.array(found[name], dtype=float) for name in _ARRAYS}
     known = (name for name in ("velocities", "rates") if found[name] is not None)
     optional: dict[str, Any] = {name: np.array(found[name], dtype=float) for name in known}
-    status = tuple(Status(one) for one in found["status"])
+    findings = [list(map(Finding.from_json, lane)) for lane in found["findings"]]
     markers, end = tuple(found["markers"]), found.get("end")
-    lanes: dict[str, Any] = {"reasons": tuple(found.get("reasons", ())), "changes": found.get("changes", ())}
-    return Trajectory(**plain, **arrays, **optional, **lanes, markers=markers, status=status, end=end)
+    changes = found.get("changes", ())
+    return Trajectory(**plain, **arrays, **optional, changes=changes, markers=markers, lane_findings=findings, end=end)

@@ -109,7 +109,7 @@ class Examined:
                 if second.ok:
                     return Careful(second, scene), ""
                 if second.status[0] is Status.FAILED:
-                    note = note or f"{what} error not estimated: {second.message}"
+                    note = note or f"{what} error not estimated: {second.explanation}"
                 else:
                     doubtful = Careful(second, scene)
         except ShoalError as error:

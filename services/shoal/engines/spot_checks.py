@@ -43,7 +43,7 @@ def spot_check(
         check = replace(
             check,
             errors=worst([check.errors, run.errors]),
-            complaint=check.complaint or ("" if run.ok else f"{_words(here)}: {run.message}"),
+            complaint=check.complaint or ("" if run.ok else f"{_words(here)}: {run.explanation}"),
         )
     return check
 

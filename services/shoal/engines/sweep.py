@@ -15,8 +15,10 @@ from shoal.engines.contract import Engine, sampling_times
 from shoal.engines.starts import Elsewhere, StatedStart
 from shoal.error_budget import ErrorBudget
 from shoal.errors import InputError
+from shoal.json_values import plain
+from shoal.mechanics import findings as kinds
 from shoal.scene import Scene
-from shoal.trajectory import Array, Status, Trajectory, plain
+from shoal.trajectory import Array, Status, Trajectory
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -186,7 +188,7 @@ def sweep(
         {name: positions[name] - points[0, k].T for k, name in enumerate(trajectory.markers)},
         trajectory.status,
         trajectory.wall_s,
-        reasons=trajectory.reasons,
+        reasons=() if trajectory.ok else tuple(map(trajectory.reason, range(trajectory.lanes))),
         changes=tuple(trajectory.changes),
         stated=StatedStart.of(scene, grid),
     )
@@ -197,15 +199,15 @@ def _gone_on(engine: Engine, scene: Scene, grid: Mapping[str, Array], found: Tra
     from shoal.engines.ways import as_run
 
     started, lanes = time.perf_counter(), found.lanes
-    points, status = found.points.copy(), list(found.status)
-    reasons, changes = [found.reason(k) for k in range(lanes)], [found.changed(k) for k in range(lanes)]
+    points, findings = found.points.copy(), list(found.lane_findings or [()] * lanes)
+    changes = [found.changed(k) for k in range(lanes)]
 
     def take(run: Trajectory, places: Iterable[int]) -> None:
         for lane, place in enumerate(places):
-            points[..., place], status[place] = run.points[..., lane], run.status[lane]
-            reasons[place], changes[place] = run.reason(lane), run.changed(lane)
+            points[..., place], changes[place] = run.points[..., lane], run.changed(lane)
+            findings[place] = run.lane_findings[lane] if run.lane_findings else ()
 
-    left = np.flatnonzero([one is not Status.OK for one in status])
+    left = np.flatnonzero([one is not Status.OK for one in found.status])
     for _ in range(LONE):
         if scene.solver.integrator != "auto" or not left.size:
             break
@@ -214,7 +216,7 @@ def _gone_on(engine: Engine, scene: Scene, grid: Mapping[str, Array], found: Tra
         try:
             alone = engine.simulate(scene.with_values(values), found.times)
         except InputError as error:
-            reasons[first] = str(error)
+            findings[first] = [*findings[first], kinds.REFUSED.found(str(error))]
             continue
         take(alone, [int(first)])
         if left.size and alone.ok:
@@ -222,6 +224,4 @@ def _gone_on(engine: Engine, scene: Scene, grid: Mapping[str, Array], found: Tra
             take(run, left.tolist())
             left = left[[one is not Status.OK for one in run.status]]
     wall_s = found.wall_s + time.perf_counter() - started
-    return replace(
-        found, points=points, status=tuple(status), wall_s=wall_s, reasons=tuple(reasons), changes=tuple(changes)
-    )
+    return replace(found, points=points, lane_findings=findings, wall_s=wall_s, changes=tuple(changes))

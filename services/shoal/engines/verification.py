@@ -21,17 +21,18 @@ from shoal.engines.gauss import GaussEngine
 from shoal.engines.sources import SOURCES, WRONG, Examined, Rejected
 from shoal.engines.ways import as_run
 from shoal.error_budget import ErrorBudget
+from shoal.findings import Finding
+from shoal.json_values import plain
+from shoal.mechanics import findings as kinds
 from shoal.mechanics.reach import span
 from shoal.scene import GROUND, Scene
 from shoal.scene.joints import places
-from shoal.trajectory import Array, Status, Trajectory, plain
+from shoal.trajectory import Array, Trajectory
 
 _NO_PATH = 1e-9
 """Of the machine's size: markers that stay nearer to a pin go nowhere."""
 WORTH = 0.01
 """What the model leaves out is worth a warning beyond this fraction of the scale."""
-SMALLER = "a smaller solver.step, or solver.relative_tolerance and solver.absolute_tolerance"
-"""What cures a time error; the absolute tolerance is that of a motion of nanometres."""
 
 
 @dataclass(frozen=True)
@@ -65,44 +66,40 @@ class Verification:
         return dict(plain(found))
 
     @property
-    def complaint(self) -> str:
-        """Return the reason for rejecting the run; empty if it is accepted."""
+    def findings(self) -> list[Finding]:
+        """Return the reason for rejecting the run, or remarks on errors that are large and do not reject it."""
+        rejection = self._rejection()
+        return self._remarks() if rejection is None else [rejection]
+
+    def _rejection(self) -> Finding | None:
         if self.rejected:
-            return f"a more careful run is rejected ({self.rejected}); use {SMALLER}"
+            return kinds.CAREFUL_REJECTED.found(f"a more careful run is rejected ({self.rejected})")
         found = (self.error("time"), WRONG * self.scale, "m"), (self.angle_error or 0.0, WRONG, "rad")
         for error, allowed, unit in found:
             if error > allowed and self.engine:
-                return (
-                    f"{self.engine} differs from the native solver by about {error:.2g} {unit}: its model or its steps "
-                    "are others; see that it means the same by this scene, and use a smaller solver.step if it heeds "
-                    "that, or a shorter solver.duration if the motion is chaotic"
-                )
+                text = f"{self.engine} differs from the native solver by about {error:.2g} {unit}"
+                return kinds.DIFFERS.found(f"{text}: its model or its steps are others", error=error, allowed=allowed)
             if error > allowed:
-                return (
-                    f"the time error is about {error:.2g} {unit}: use {SMALLER}, "
-                    "or a shorter solver.duration if the motion is chaotic"
-                )
-        if self.error("mesh") > WRONG * self.scale:
-            return f"the mesh error is about {self.error('mesh'):.2g} m: use more elements, or --tolerance to find them"
-        if self.error("bending") > WRONG * self.scale:
-            return (
-                f"modal rods bend too far: cables, which may, end about {self.error('bending'):.2g} m away; "
-                "use element: ancf-cable"
-            )
-        return ""
+                text = f"the time error is about {error:.2g} {unit}"
+                return kinds.TIME_ERROR.found(text, error=error, allowed=allowed)
+        for source, kind, text in (
+            ("mesh", kinds.MESH_ERROR, "the mesh error is about {:.2g} m"),
+            ("bending", kinds.BENDING_ERROR, "modal rods bend too far: cables, which may, end about {:.2g} m away"),
+        ):
+            if (error := self.error(source)) > WRONG * self.scale:
+                return kind.found(text.format(error), error=error, allowed=WRONG * self.scale)
+        return None
 
-    @property
-    def warning(self) -> str:
-        """Return a remark on errors that are large and do not reject the run; empty if there are none."""
-        found = [self.note] if self.note and "time" not in self.errors.known else []
-        for source, remark in (
-            ("theory", "shear and rotary inertia that slender rods leave out are worth {:.2g} m"),
-            ("bending", "that modal rods bend more than a little is worth {:.2g} m"),
-            ("friction", "what dry friction should hold creeps by {:.2g} m; lower coulomb_speed"),
+    def _remarks(self) -> list[Finding]:
+        found = [kinds.NOT_ESTIMATED.found(self.note)] if self.note else []
+        for source, kind, remark in (
+            ("theory", kinds.SHEAR_LEFT_OUT, "shear and rotary inertia that slender rods leave out are worth {:.2g} m"),
+            ("bending", kinds.BENDS_FAR, "that modal rods bend more than a little is worth {:.2g} m"),
+            ("friction", kinds.CREEPS, "what dry friction should hold creeps by {:.2g} m"),
         ):
             if self.error(source) > WORTH * self.scale:
-                found.append(remark.format(self.error(source)))
-        return "; ".join(found)
+                found.append(kind.found(remark.format(self.error(source)), error=self.error(source)))
+        return found
 
 
 def verified(engine: Engine, scene: Scene, times: Sequence[float] | Array | None = None) -> Trajectory:
@@ -122,12 +119,10 @@ def run_verified(
 
 
 def with_errors(trajectory: Trajectory, verification: Verification) -> Trajectory:
-    """Return a run with the errors that were estimated of it, failed where they are too large."""
+    """Return a run of one lane with the errors that were estimated of it, rejected where they are too large."""
     found = {"errors": verification.errors.to_json(), "verification": verification.to_json()}
     model = {**trajectory.model, **found}
-    if verification.complaint:
-        return replace(trajectory, model=model, status=(Status.FAILED,), message=verification.complaint)
-    return replace(trajectory, model=model, message=verification.warning)
+    return replace(trajectory, model=model, lane_findings=[verification.findings])
 
 
 def verify(trajectory: Trajectory, scene: Scene, native: Engine | None = None) -> Verification:

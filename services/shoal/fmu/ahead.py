@@ -83,5 +83,5 @@ class Ahead:
             count, self._fresh = 0, False
         run = get_engine("gauss").simulate(self._scene, np.append(time, time + step * np.arange(1, count + 1)))
         if not run.ok:
-            raise ComputationError(f"{self._scene.name}: the motion up to {run.times[-1]:g} s: {run.message}")
+            raise ComputationError(f"{self._scene.name}: the motion up to {run.times[-1]:g} s: {run.explanation}")
         return run

@@ -21,8 +21,9 @@ from shoal.identification.uncertainty.intervals import Value
 from shoal.identification.uncertainty.posterior import Posterior
 from shoal.identification.uncertainty.prediction import Prediction
 from shoal.identification.uncertainty.profiles import Profile
+from shoal.json_values import plain
 from shoal.scene import Scene
-from shoal.trajectory import Array, plain
+from shoal.trajectory import Array
 
 if TYPE_CHECKING:
     import pandas as pd

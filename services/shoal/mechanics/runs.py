@@ -15,6 +15,7 @@ import numpy as np
 
 from shoal.compile import clock
 from shoal.errors import InputError, UnstableStepError
+from shoal.json_values import plain
 from shoal.mechanics import plane
 from shoal.mechanics import reach as reaches
 from shoal.mechanics.assembly.groups import start_angle
@@ -45,7 +46,7 @@ from shoal.mechanics.verdict import Limits
 from shoal.mechanics.workspace import Workspace
 from shoal.scene import Rod, Scene
 from shoal.scene.held_drives import held_drives
-from shoal.trajectory import Status, Trajectory, plain
+from shoal.trajectory import Trajectory
 
 INSTANTS = 8
 """The workspaces of so many lists of sampling times and kinds of tiles are kept."""
@@ -140,13 +141,13 @@ class Runs:
             except BaseException:
                 stop.set()
                 raise
-        status, reasons = limits.verdict(numbers, self.choice, moved.failed)
+        findings = limits.check(numbers, self.choice, moved.failed)
         largest = np.maximum.reduce(numbers, axis=1)
         facts = pickle.loads(self._found[single])
         facts["evaluations"] = int(largest[EVALUATIONS])
         if largest[CLOSENESS] > 0.0:
             facts["distance_from_singular"] = float(largest[CLOSENESS] ** -0.5)
-        ended = Ended(moved, end, *left[0], motion[-1, :, d, 0].copy()) if left and status[0] is Status.OK else None
+        ended = Ended(moved, end, *left[0], motion[-1, :, d, 0].copy()) if left and not any(findings) else None
         return Trajectory(
             engine="gauss",
             times=times,
@@ -155,17 +156,15 @@ class Runs:
             angles=motion[:, :, d],
             velocities=motion[:, :, d + 1 : 2 * d + 1],
             rates=motion[:, :, 2 * d + 1],
-            status=status,
             energy_drift=numbers[ENERGY_DRIFT],
             constraint_drift=numbers[CONSTRAINT_DRIFT],
             steps=int(largest[STEPS]),
             wall_s=clock.now() - begin,
-            message=next(filter(None, reasons), ""),
+            lane_findings=findings,
             model=facts,
             end=ended,
             states=states,
             changes=() if single else Changes(moved),
-            reasons=reasons,
         )
 
     @cached_property

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from shoal.findings import Finding, Kind
+from shoal.mechanics import findings as kinds
 from shoal.mechanics import reach as reaches
 from shoal.mechanics.affine import NEGLIGIBLE
 from shoal.mechanics.constraints import OPEN
@@ -25,7 +29,6 @@ from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import Array, Flags
 from shoal.scene import GROUND, Function, Scene
 from shoal.scene.joints import Joint
-from shoal.trajectory import Status
 
 SINKING = 3000.0
 """A weight that nothing holds yet falls for as long as the error of its rate is below the absolute tolerance; by then
@@ -38,9 +41,9 @@ REACH = "let the drives ask for no more than the joints can reach"
 
 CROSSING = (
     "the machine is at a singular position there, where branches of its motion cross and so small a motion does not "
-    "show which one it is on; begin it farther away from that position, or with rates (initial, drives)"
+    "show which one it is on"
 )
-"""Reason and advice where a motion creeps at a singular position."""
+"""Reason where a motion creeps at a singular position."""
 
 _JUDGED = slice(FARTHEST, CONSTRAINT_DRIFT + 1)
 """What has a largest value."""
@@ -60,10 +63,10 @@ class Limits:
         """Where the ground holds the machine [m], (anchors, d, lanes) or (anchors, d, 1)."""
         # Modal rods that turn faster than they vibrate fly apart, as they do not know that tension makes them stiff.
         modal = any(body.element == "modal" for body in scene.bodies.values())
-        self._remark = "; modal rods are right for small bending: use element: ancf-cable for more" if modal else ""
+        self._remark = ("modal rods are right for small bending: use element: ancf-cable for more",) if modal else ()
         laws = [model.function(int(number)).breaks[1:-1] for number in model.forces.table if number >= 0]
         known = max((law[0] for law in laws), default=0.0), min((law[-1] for law in laws), default=0.0)
-        self._laws = f"; `elastic` of the loads is known from {known[0]:.3g} to {known[1]:.3g}" if laws else ""
+        self._laws = (f"`elastic` of the loads is known from {known[0]:.3g} to {known[1]:.3g}",) if laws else ()
         self._driven = any(not _constant(joint) for joint in scene.joints.values()) or bool(scene.ground_points)
         self._weight = float(np.max(np.abs(model.weight), initial=0.0))
         stiff = max(np.max(family.coefficients, initial=0.0) for family in model.elements)
@@ -99,57 +102,62 @@ class Limits:
         moving = 0.5 * self._mass * (RESOLVED * tolerance) ** 2
         return self._still + moving + self._weight * SINKING * tolerance * end + 1e-300
 
-    def verdict(self, numbers: Array, choice: Choice, failed: Flags) -> tuple[tuple[Status, ...], tuple[str, ...]]:
-        """Status of every lane, and why it is not ok; failed: lanes that have no start."""
+    def check(self, numbers: Array, choice: Choice, failed: Flags) -> list[list[Finding]]:
+        """Return the findings about every lane; nothing if all are ok. failed: lanes that have no start."""
         lanes = numbers.shape[1]
         fine = numbers[_JUDGED] <= self._fine
         if fine.all() and not failed.any():
-            return (Status.OK,) * lanes, ("",) * lanes
+            return []
         # Lanes may be machines of different lengths.
         reach = np.broadcast_to(self._reach(numbers[ENERGY_SCALE]), lanes)
         failed = np.broadcast_to(failed, lanes)
-        statuses, reasons = [Status.OK] * lanes, [""] * lanes
+        found: list[list[Finding]] = [[] for _ in range(lanes)]
         for lane in np.flatnonzero(~fine.all(axis=0) | failed):
-            statuses[lane], reason = self._judged(choice, numbers[:, lane], float(reach[lane]), bool(failed[lane]))
-            reasons[lane] = reason + self._remark
-        return tuple(statuses), tuple(reasons)
+            one = self._check_lane(choice, numbers[:, lane], float(reach[lane]), bool(failed[lane]))
+            found[lane] = [] if one is None else [replace(one, steps=(*one.steps, *self._remark))]
+        return found
 
-    def _judged(self, choice: Choice, numbers: Array, reach: float, failed: bool) -> tuple[Status, str]:
-        """Status of one lane, whose numbers are (NUMBERS,), and the reason if it is not ok."""
+    def _check_lane(self, choice: Choice, numbers: Array, reach: float, failed: bool) -> Finding | None:
+        """Return the finding about one lane, whose numbers are (NUMBERS,); None if it is ok."""
         farthest, energy_drift, constraint_drift = numbers[_JUDGED]
         steps = numbers[STEPS]
         adaptive, allowed = facts(choice.name).adaptive, self._solver.energy_tolerance
         finite = np.isfinite(farthest) and np.isfinite(energy_drift)
         if failed:
-            return Status.FAILED, "no start agrees with the joints and with what is stated"
+            return kinds.NO_START.found("no start agrees with the joints and with what is stated")
         if not finite and numbers[UNCLOSED] >= 0:
-            return Status.DRIFTED if self._driven else Status.DIVERGED, self._open(numbers, adaptive)
+            return self._open(kinds.NOT_CLOSED if self._driven else kinds.TORN_OPEN, numbers, adaptive)
         singular = numbers[SINGULAR] == HERE
         if not finite and np.isfinite(energy_drift) and adaptive and (singular or steps >= self._solver.max_steps):
             there = f"{steps:.0f} steps of {choice.name} led to {numbers[REACHED]:.4g} s only"
+            reached = {"steps": float(steps), "time": float(numbers[REACHED])}
             if singular:
-                return Status.FAILED, f"{there}: {CROSSING}"
-            return Status.FAILED, f"{there}; raise solver.max_steps or solver.relative_tolerance"
+                return kinds.SINGULAR.found(f"{there}: {CROSSING}", **reached)
+            return kinds.STEPS_EXHAUSTED.found(there, "raise solver.max_steps or solver.relative_tolerance", **reached)
         if not finite:
             advice = "no step is short enough for it" if adaptive else "use a smaller step"
             ended = f"the motion is not finite {self._since(numbers[ENDED])}"
-            return Status.DIVERGED, f"{ended}; {advice}{', or ' + REACH if self._driven else ''}{self._laws}"
+            advice = f"{advice}{', or ' + REACH if self._driven else ''}"
+            return kinds.NOT_FINITE.found(ended, advice, *self._laws, time=float(numbers[ENDED]))
         if farthest > reach:
-            return Status.OUT_OF_REACH, f"a marker is {farthest:.3g} m away, the reach is {reach:.3g} m"
+            text = f"a marker is {farthest:.3g} m away, the reach is {reach:.3g} m"
+            return kinds.OUT_OF_REACH.found(text, distance=float(farthest), reach=reach)
         if energy_drift > allowed:
-            advice = "" if adaptive else "; use a smaller step"
-            return Status.ENERGY, f"energy is off by {energy_drift:.2g}, allowed {allowed:g} (relative){advice}"
+            text = f"energy is off by {energy_drift:.2g}, allowed {allowed:g} (relative)"
+            steps_ = () if adaptive else ("use a smaller step",)
+            return kinds.ENERGY.found(text, *steps_, drift=float(energy_drift), allowed=allowed)
         if not constraint_drift <= OPEN:
-            return Status.DRIFTED, self._open(numbers, adaptive)
-        return Status.OK, ""
+            return self._open(kinds.NOT_CLOSED, numbers, adaptive)
+        return None
 
-    def _open(self, numbers: Array, adaptive: bool) -> str:
+    def _open(self, kind: Kind, numbers: Array, adaptive: bool) -> Finding:
         """Name the joint that no position closes, since when, and the likely causes."""
         field = self._field(self._model.constraint_names[int(numbers[UNCLOSED])])
         cause = REACH if self._driven else "use a smaller step"
         if self._driven and not adaptive:
             cause = f"use a smaller step, or {REACH}"
-        return f"constraints are violated: {field} cannot be closed {self._since(numbers[ENDED])}; {cause}"
+        text = f"constraints are violated: {field} cannot be closed {self._since(numbers[ENDED])}"
+        return kind.found(text, cause, drift=float(numbers[CONSTRAINT_DRIFT]), time=float(numbers[ENDED]))
 
     def _since(self, t: float) -> str:
         """An instant [s], and the drives that move then."""

@@ -52,7 +52,7 @@ def campbell(found: Campbell) -> Figure:
 def says(found: Campbell) -> str:
     """The finding in one sentence."""
     if not found.ok:
-        return f"{found.scene.name}: {found.verdict[1]}"
+        return f"{found.scene.name}: {found.message}"
     critical = ", ".join(f"{speed:.4g}" for speed in found.critical_speeds)
     ends = f"from {min(found.speeds):.4g} to {max(found.speeds):.4g} rad/s"
     text = f"critical at {critical} rad/s" if critical else "no forward whirl meets the rotation"

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from shoal.error_budget import ErrorBudget
-from shoal.trajectory import Array, json_text
+from shoal.json_values import json_text
+from shoal.trajectory import Array
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -28,8 +28,6 @@ def estimates(trajectory: Trajectory) -> Iterator[str]:
         angle = verification.get("angle_error")
         turned = "" if angle is None else f"; angles, by the time step: {angle:.1e} rad"
         yield f"estimated error at the markers: {trajectory.errors}{turned}"
-    if verification.get("note"):
-        yield verification["note"]
     for source, why in REMEDIES.items():
         if source in trajectory.errors.known:
             yield f"{source}: {why}"

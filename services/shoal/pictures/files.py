@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shoal.errors import InputError
-from shoal.trajectory import json_text
+from shoal.json_values import json_text
 from shoal.whole import whole
 
 if TYPE_CHECKING:

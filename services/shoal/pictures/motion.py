@@ -10,12 +10,13 @@ import numpy as np
 
 from shoal.engines.contract import Engine
 from shoal.errors import ComputationError, InputError
+from shoal.json_values import plain
 from shoal.pictures.links import At, Links
 from shoal.pictures.outline import ground, outlined
 from shoal.pictures.solids import Bar, MarkedScene
 from shoal.pictures.views import ViewDirection, views
 from shoal.scene import Scene
-from shoal.trajectory import Array, plain
+from shoal.trajectory import Array
 
 if TYPE_CHECKING:
     from shoal.pictures.answer import Answer
@@ -115,7 +116,7 @@ def scene_motion(scene: Scene, engine: Engine, until: float, frames: int = _FRAM
     known = np.all(np.isfinite(seen.points[..., 0]), axis=(1, 2))
     count = frames if np.all(known) else int(np.argmin(known))
     if count < 2:
-        raise ComputationError(f"{scene.name}: there is no motion to show: {seen.message or seen.status[0]}")
+        raise ComputationError(f"{scene.name}: there is no motion to show: {seen.explanation or seen.status[0]}")
     markers = {name: seen.marker(name)[:count] for name in scene.markers}
     shown = read(lambda name: seen.marker(name)[:count], seen.times[:count])
     return DrawnMotion(scene.name, seen.times[:count], ground(scene), markers=markers, **shown)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shoal.engines import get_engine
+from shoal.findings import sentence
 from shoal.pictures.choice import rows, tells_places, why
 from shoal.pictures.drawn import Drawn
 from shoal.pictures.estimates import budget, estimates, grade
@@ -69,7 +70,8 @@ def page(
 def _remarks(trajectory: Trajectory, selection: Selection | None) -> list[str]:
     if selection is not None:
         return why(selection)
-    return [f"{one[0].upper()}{one[1:]}." for one in estimates(trajectory)]
+    found = trajectory.findings if trajectory.ok else ()
+    return [sentence(one.text) for one in found] + [f"{one[0].upper()}{one[1:]}." for one in estimates(trajectory)]
 
 
 def moved(trajectory: Trajectory, scene: Scene) -> DrawnMotion:
@@ -79,7 +81,7 @@ def moved(trajectory: Trajectory, scene: Scene) -> DrawnMotion:
 
 def _lead(trajectory: Trajectory, selection: Selection | None) -> str:
     if not trajectory.ok:
-        return f"Not to be trusted: {trajectory.message or trajectory.status[0]}."
+        return f"Not to be trusted: {trajectory.explanation or trajectory.status[0]}."
     asked = "" if selection is None else f", for a tolerance of {length(selection.tolerance)}"
     name = trajectory.markers[-1]
     place = ", ".join(f"{x:.4g}" for x in trajectory.marker(name)[-1])

@@ -18,12 +18,13 @@ from scipy import optimize
 
 from shoal.errors import ComputationError, InputError
 from shoal.findings import Finding, message
+from shoal.json_values import plain
 from shoal.response import findings as kinds
 from shoal.response.inputs import Inputs, UncertainParameter
 from shoal.response.marginals import scaled
 from shoal.response.runs import CachedModel, Model
 from shoal.scene import Scene
-from shoal.trajectory import Array, plain
+from shoal.trajectory import Array
 
 WIDEST, TIGHTEST = 3.0, 1e-3
 """Factors on the tolerances that are stated, beyond which none is looked at."""

@@ -12,6 +12,7 @@ from shoal.engines.starts import Elsewhere
 from shoal.error_budget import GOOD, ErrorBudget, Grade
 from shoal.errors import InputError
 from shoal.findings import Concluded, Finding
+from shoal.json_values import plain
 from shoal.response.allocation import Allocation
 from shoal.response.enclosure import Bounds, unseen
 from shoal.response.findings import ResponseStatus, status_of
@@ -22,7 +23,7 @@ from shoal.response.probability_boxes import ProbabilityBoxes
 from shoal.response.statistics import QUANTILES, Statistics
 from shoal.response.verify import Finer
 from shoal.scene import Scene
-from shoal.trajectory import Array, plain
+from shoal.trajectory import Array
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -20,6 +20,7 @@ from shoal.engines.verification import Verification, run_verified
 from shoal.engines.ways import on_finer_mesh
 from shoal.error_budget import ErrorBudget, worst
 from shoal.findings import Finding
+from shoal.json_values import plain
 from shoal.response import findings as kinds
 from shoal.response.enclosure import Bounds
 from shoal.response.inputs import BoolArray
@@ -30,7 +31,7 @@ from shoal.response.respond import ModelResponse
 from shoal.response.runs import CachedModel
 from shoal.response.statistics import Statistics
 from shoal.scene.refined import refined
-from shoal.trajectory import Array, plain
+from shoal.trajectory import Array
 
 REPEATED = 48
 """Runs that are repeated: those that attain most bounds."""

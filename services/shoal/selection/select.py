@@ -15,6 +15,8 @@ from shoal.engines.gauss import GaussEngine
 from shoal.engines.theory import left_out
 from shoal.error_budget import ErrorBudget
 from shoal.errors import ComputationError, InputError
+from shoal.json_values import plain
+from shoal.mechanics import findings as kinds
 from shoal.scene import Rod, Scene
 from shoal.selection.coarsen import WITHIN, coarsen
 from shoal.selection.levels import RIGID, SHEARS, SLENDER, STOUT, Levels, apply, open_rods
@@ -22,7 +24,7 @@ from shoal.selection.prior import PriorEstimate, estimate
 from shoal.selection.refine import AGREE, PATIENCE, REFERENCE, LevelRuns, Progress, ReferenceModel, refine, settled
 from shoal.selection.run import Candidate, distance, fewest, rigid_scene, run
 from shoal.selection.strain_limits import excessive_torques
-from shoal.trajectory import Array, Status, Trajectory, plain
+from shoal.trajectory import Array, Trajectory
 
 GRID = 50
 """Instants, evenly spread over the run, at which the tolerance holds in addition to the requested ones."""
@@ -378,5 +380,6 @@ def _at(candidate: Candidate, grid: Array, asked: Array, errors: ErrorBudget, me
 def _rejected(run: Trajectory, errors: ErrorBudget, reason: str) -> Trajectory:
     """Return a run marked as failed, as its errors exceed the tolerance; a rejected run keeps its status."""
     if errors.unknown or errors.total is None:
-        return replace(run, message=reason)
-    return replace(run, status=(Status.FAILED,), message=f"tolerance not met, {errors.brief}: {reason}")
+        return replace(run, lane_findings=[[*run.findings, kinds.NOT_ESTIMATED.found(reason)]])
+    text = f"tolerance not met, {errors.brief}: {reason}"
+    return replace(run, lane_findings=[[kinds.TOLERANCE_NOT_MET.found(text, error=errors.total)]])

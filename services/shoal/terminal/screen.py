@@ -14,8 +14,9 @@ from rich.table import Table
 
 from shoal.compile import progress
 from shoal.error_budget import Grade
+from shoal.findings import Concluded
+from shoal.json_values import json_text
 from shoal.scene import Scene
-from shoal.trajectory import json_text
 
 _ENOUGH = 10_000
 """Columns that every table has room in."""
@@ -123,6 +124,12 @@ def listing(title: str, items: Mapping[str, str]) -> None:
         made.add_row(name, text)
     out.print(made)
     out.print()
+
+
+def findings(answer: Concluded) -> None:
+    """Print what was found out about an answer, and the steps to take next."""
+    say(*(f"  {one.text}" for one in answer.findings))
+    say(*(f"next: {step}" for step in answer.advice))
 
 
 def say(*texts: str, style: str = "") -> None:

@@ -17,6 +17,7 @@ from shoal.identification.methods.least_squares import descend
 from shoal.identification.uncertainty import posterior as drawing
 from shoal.identification.uncertainty.covariance import blocks_of
 from shoal.identification.uncertainty.linearisation import linearise
+from shoal.mechanics.findings import NOT_FINITE
 from shoal.trajectory import Array
 
 NOISE, GRAVITY = 0.05, -9.81
@@ -188,8 +189,7 @@ def test_what_cannot_be_simulated_is_impossible_and_counted(fall: str) -> None:
         def simulate_many(self, scene, values, times=None):  # type: ignore[no-untyped-def]
             found = engine.simulate_many(scene, values, times)
             bad = values["initial.P.velocity.1"] > limit if "initial.P.velocity.1" in values else np.zeros(1, bool)
-            status = [one if not b else type(one).DIVERGED for one, b in zip(found.status, bad, strict=True)]
-            return replace(found, status=tuple(status))
+            return replace(found, lane_findings=[[NOT_FINITE.found("made to")] if one else [] for one in bad])
 
     solution = least_squares(measurement)[0]
     limit = np.inf

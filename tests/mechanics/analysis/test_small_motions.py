@@ -119,7 +119,7 @@ def test_a_pendulum_standing_beside_a_stiff_rod_is_unstable() -> None:
     found = modes(_beside(UP), about="start", count=1)
     (mode,) = found.modes
     assert mode.kind == "unstable"
-    assert found.verdict[1] == "it does not stay there: a motion of B grows with exp(t * 3.131/s)"
+    assert found.message == "it does not stay there: a motion of B grows with exp(t * 3.131/s)"
     assert mode.eigenvalue.real == pytest.approx(np.sqrt(G / 1.001), rel=1e-9)
 
 
@@ -216,18 +216,18 @@ def test_a_start_that_moves_has_no_modes_at_rest() -> None:
     assert modes(Scene.parse(data), about="start").ok
     data["initial"]["A"]["rate"] = 5.0
     found = modes(Scene.parse(data), about="start")
-    assert found.verdict[0] == "moving"
-    assert "the residual acceleration of A is up to" in found.verdict[1]
+    assert found.status == "moving"
+    assert "the residual acceleration of A is up to" in found.message
 
 
 def test_modes_that_a_mesh_does_not_know_are_named(tmp_path: Any) -> None:
     scene = _pendulum(elements=1)
     found = of_modes(modes(scene, count=4), scene)
-    assert found.verdict[0] == "coarse-mesh"
+    assert found.status == "coarse-mesh"
     coarse = [number for number, error in enumerate(found.mesh_errors, 1) if error > 0.5]
     assert coarse
     assert 1 not in coarse
-    assert ", ".join(map(str, coarse)) in found.verdict[1]
+    assert ", ".join(map(str, coarse)) in found.message
     path = tmp_path / "pendulum.yaml"
     path.write_text(json.dumps(scene.model_dump(mode="json")))
     assert CliRunner().invoke(main, ["modes", str(path), "--count", "1"]).exit_code == 0

@@ -225,7 +225,7 @@ def test_lanes_start_where_a_scene_by_itself_does_however_its_start_is_rounded()
             except InputError:
                 assert lanes.status[lane] is not Status.OK
                 continue
-            assert lanes.status[lane] is alone.status[0], (seed, lanes.reasons)
+            assert lanes.status[lane] is alone.status[0], (seed, lanes.message)
             np.testing.assert_allclose(lanes.points[..., lane], alone.points[..., 0], atol=1e-9)
 
 

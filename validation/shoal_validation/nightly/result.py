@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from enum import StrEnum
 from typing import Any
 
-from shoal.trajectory import plain
+from shoal.json_values import plain
 
 SCHEMA = "shoal-night"
 VERSION = 1

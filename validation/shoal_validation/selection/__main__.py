@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 from rich.progress import track
+from shoal.json_values import plain
 from shoal.selection.refine import PATIENCE
-from shoal.trajectory import plain
 
 from shoal_validation.document import rewrite
 from shoal_validation.selection.chart import draw_chart

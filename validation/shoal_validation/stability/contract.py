@@ -161,8 +161,8 @@ def simulated(engine: Any, scene_json: str, times: bytes) -> Trajectory:
 
 def checked(run: Trajectory, scene: Scene) -> Trajectory:
     """The run as `shoal simulate` reports it, after a second and more careful one; only asked where it is off."""
-    complaint = verify(run, scene).complaint
-    return replace(run, status=(Status.FAILED,), message=complaint) if complaint else run
+    findings = verify(run, scene).findings
+    return replace(run, lane_findings=[findings]) if any(one.kind.implies for one in findings) else run
 
 
 def said(run: Trajectory) -> Status:

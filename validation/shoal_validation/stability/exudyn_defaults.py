@@ -13,8 +13,9 @@ from shoal.engines.capabilities import require
 from shoal.engines.contract import Capabilities, sampling_times
 from shoal.engines.exudyn import ExudynEngine
 from shoal.engines.exudyn.build import ExudynSystem, build, library
+from shoal.mechanics import findings as kinds
 from shoal.scene import Scene
-from shoal.trajectory import Array, Status, Trajectory
+from shoal.trajectory import Array, Trajectory
 
 
 @dataclass(frozen=True)
@@ -56,12 +57,11 @@ class ExudynDefaults:
             markers=tuple(scene.markers),
             points=np.stack(points, axis=1)[..., None],
             angles=np.full((len(wanted), len(points), 1), np.nan),
-            status=(Status.FAILED if failure else Status.OK,),
             energy_drift=np.full(1, np.nan),
             constraint_drift=np.full(1, np.nan),
             steps=len(path) - 1,
             wall_s=time.perf_counter() - began,
-            message=failure,
+            lane_findings=[[kinds.ENGINE_STOPPED.found(failure)] if failure else []],
         )
 
     def simulate_many(

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from shoal.trajectory import plain
+from shoal.json_values import plain
 
 from shoal_validation.judge import Outcome
 from shoal_validation.stability.contract import Axis, Cell, Panel, StabilityMap

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from shoal.home import processor
-from shoal.trajectory import plain
+from shoal.json_values import plain
 from shoal.versions import versions
 
 from shoal_validation.problems import get_problem

@@ -16,10 +16,12 @@ from shoal.engines.capabilities import require
 from shoal.engines.contract import Capabilities, check_lanes, sampling_times
 from shoal.engines.interrupts import interruptible
 from shoal.errors import InputError
+from shoal.findings import Finding
+from shoal.mechanics import findings as kinds
 from shoal.mechanics.reach import MARGIN, stretch
 from shoal.mechanics.start.start import started
 from shoal.scene import Scene
-from shoal.trajectory import Array, Status, Trajectory
+from shoal.trajectory import Array, Trajectory
 
 if TYPE_CHECKING:
     from shoal.engines.casadi.model import CasadiModel
@@ -83,12 +85,11 @@ class CasadiEngine:
             markers=model.markers,
             points=np.stack([run.points for run in runs], axis=-1),
             angles=np.stack([run.angles for run in runs], axis=-1),
-            status=tuple(run.status for run in runs),
             energy_drift=np.array([run.energy_drift for run in runs]),
             constraint_drift=np.zeros(len(runs)),
             steps=max(run.steps for run in runs),
             wall_s=time.perf_counter() - began,
-            message=next((run.message for run in runs if run.message), ""),
+            lane_findings=[run.findings for run in runs],
             model={
                 "formulation": "Lagrange, minimal coordinates",
                 "unknowns": model.unknowns,
@@ -107,7 +108,8 @@ class CasadiEngine:
             with interruptible():
                 states, steps = self._integrate(model, scene, x0, grid[1:])
         except RuntimeError as error:
-            return _failed(model, times.size, Status.FAILED, f"the integrator stopped: {_reason(error)}")
+            text = f"the integrator stopped: {_reason(error)}"
+            return _failed(model, times.size, kinds.ENGINE_STOPPED.found(text))
         return _check(model, scene, np.hstack([x0.full(), states]), wanted, steps)
 
     def _integrate(self, model: CasadiModel, scene: Scene, x0: Any, grid: Array) -> tuple[Array, int]:
@@ -128,10 +130,9 @@ class CasadiEngine:
 class _Run:
     points: Array
     angles: Array
-    status: Status
+    findings: list[Finding]
     energy_drift: float
     steps: int
-    message: str
 
 
 @lru_cache(maxsize=64)
@@ -172,7 +173,7 @@ def _check_grid(times: Array) -> tuple[Array, npt.NDArray[np.intp]]:
 def _check(model: CasadiModel, scene: Scene, states: Array, wanted: npt.NDArray[np.intp], steps: int) -> _Run:
     """Judge a run by its states at the instants of the check grid, (2 unknowns + 1, instants)."""
     if not np.all(np.isfinite(states)):
-        return _failed(model, wanted.size, Status.DIVERGED, "the motion is not finite", steps)
+        return _failed(model, wanted.size, kinds.NOT_FINITE.found("the motion is not finite"), steps)
     instants = states.shape[1]
     points, angles = (value.full() for value in model.places(states))
     points = points.reshape(2, instants, len(model.markers)).transpose(1, 2, 0)
@@ -185,16 +186,16 @@ def _check(model: CasadiModel, scene: Scene, states: Array, wanted: npt.NDArray[
         distance = np.linalg.norm(points - model.root.T, axis=2).max(axis=0)
     reach = model.reach + longer
     excess = distance - MARGIN * reach
-    status, message = Status.OK, ""
+    found: list[Finding] = []
     if not np.all(excess <= 1e-9):
         worst = int(np.argmax(excess))
         away, chain = distance[worst], reach[worst]
-        status = Status.OUT_OF_REACH
-        message = f"marker {model.markers[worst]} goes {away:.4g} m away, its chain is {chain:.4g} m long"
+        text = f"marker {model.markers[worst]} goes {away:.4g} m away, its chain is {chain:.4g} m long"
+        found = [kinds.OUT_OF_REACH.found(text, distance=float(away), reach=float(chain))]
     elif not drift <= scene.solver.energy_tolerance:
-        status = Status.ENERGY
-        message = f"energy drifts by {drift:.2g}, allowed is {scene.solver.energy_tolerance:.2g}"
-    return _Run(points[wanted], angles[wanted], status, drift, steps, message)
+        text = f"energy drifts by {drift:.2g}, allowed is {scene.solver.energy_tolerance:.2g}"
+        found = [kinds.ENERGY.found(text, drift=drift, allowed=scene.solver.energy_tolerance)]
+    return _Run(points[wanted], angles[wanted], found, drift, steps)
 
 
 def _energy_drift(model: CasadiModel, states: Array) -> float:
@@ -206,9 +207,9 @@ def _energy_drift(model: CasadiModel, states: Array) -> float:
     return float(np.max(np.abs(balance - balance[0])) / scale) if scale > 0 else 0.0
 
 
-def _failed(model: CasadiModel, samples: int, status: Status, message: str, steps: int = 0) -> _Run:
+def _failed(model: CasadiModel, samples: int, finding: Finding, steps: int = 0) -> _Run:
     nothing = np.full((samples, len(model.markers), 2), np.nan)
-    return _Run(nothing, nothing[..., 0], status, float("nan"), steps, message)
+    return _Run(nothing, nothing[..., 0], [finding], float("nan"), steps)
 
 
 def _reason(error: RuntimeError) -> str:

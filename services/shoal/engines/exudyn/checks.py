@@ -8,12 +8,15 @@ import numpy as np
 
 from shoal.engines.exudyn.build import ExudynSystem
 from shoal.engines.exudyn.record import Indices, KeptStates
+from shoal.findings import Finding
+from shoal.mechanics import findings as kinds
 from shoal.mechanics.reach import MARGIN, distance_to_ground, reach
 from shoal.mechanics.start.rigid_bodies import lead
-from shoal.trajectory import Array, Status
+from shoal.trajectory import Array
 
 LARGEST_GAP = 1e-4
 """Joint gap per metre of machine beyond which a run has drifted."""
+REDUCE = "reduce solver.step"
 INSTANTS = 400
 """Kept steps at which energy and joints are examined."""
 
@@ -30,8 +33,7 @@ class RunCheck:
     angles: Array
     velocities: Array | None
     rates: Array | None
-    status: Status
-    message: str
+    findings: list[Finding]
     energy_drift: float
     gap: float
 
@@ -44,24 +46,23 @@ def judge(machine: ExudynSystem, record: KeptStates, failure: str) -> RunCheck:
     energy, moving = machine.energy(record.times, record.q, record.v, rows)
     # Motion that is prescribed feeds energy through constraints, which is not followed: there is no such check.
     drift = float("nan") if machine.driven else _energy_drift(machine, record, rows, energy, moving)
-    status, message = Status.OK, ""
+    found: list[Finding] = []
     furthest = float(reach(machine.scene, np.asarray(np.max(moving))))
     far = float(np.max(distance_to_ground(machine.scene, points[..., None])))
     tolerance = machine.scene.solver.energy_tolerance
     if failure:
-        status, message = Status.FAILED, failure
+        found = [kinds.ENGINE_STOPPED.found(failure)]
     elif not (np.all(np.isfinite(record.q)) and np.all(np.isfinite(record.v))):
-        status, message = Status.DIVERGED, "the coordinates stopped being finite"
+        found = [kinds.NOT_FINITE.found("the coordinates stopped being finite")]
     elif far > MARGIN * furthest:
-        status, message = (
-            Status.OUT_OF_REACH,
-            f"a marker is {far:.3g} m from the ground; the bodies reach {furthest:.3g} m",
-        )
+        text = f"a marker is {far:.3g} m from the ground, the bodies reach {furthest:.3g} m"
+        found = [kinds.OUT_OF_REACH.found(text, distance=far, reach=furthest)]
     elif gap > LARGEST_GAP * machine.span:
-        status, message = Status.DRIFTED, f"a joint opened by {gap:.3g} m; reduce solver.step"
+        found = [kinds.NOT_CLOSED.found(f"a joint opened by {gap:.3g} m", REDUCE, gap=float(gap))]
     elif drift > tolerance:
-        status, message = Status.ENERGY, f"energy is off by {drift:.3g}, allowed is {tolerance:.3g}; reduce solver.step"
-    return RunCheck(points, angles, velocities, rates, status, message, drift, gap)
+        text = f"energy is off by {drift:.3g}, allowed is {tolerance:.3g}"
+        found = [kinds.ENERGY.found(text, REDUCE, drift=drift, allowed=tolerance)]
+    return RunCheck(points, angles, velocities, rates, found, drift, gap)
 
 
 def _markers(machine: ExudynSystem, record: KeptStates) -> tuple[Array, Array, Array | None, Array | None]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -27,7 +27,7 @@ from shoal.mechanics.start.start import facts
 from shoal.scene import Scene, Spring, TorsionSpring
 from shoal.trajectory import Array, Trajectory
 
-WEAK = "; generalized-alpha is only weakly stable at solver.spectral_radius 1, use 0.9"
+WEAK = "generalized-alpha is only weakly stable at solver.spectral_radius 1, use 0.9"
 DENSE_LIMIT = 60
 """Unknowns beyond which the sparse linear solver is the faster one."""
 REDUNDANT = 0.9
@@ -122,7 +122,8 @@ class ExudynEngine(OneByOne):
                 return self.simulate(scene.with_values({"solver.step": float(shorter)}), wanted)
             failure = f"exudyn: a step leaps over a narrow part of an elastic law; solver.step needs {shorter:.3g} s"
         verdict = judge(machine, record, failure)
-        weak = damped and scene.solver.spectral_radius == 1.0 and verdict.message
+        weak = damped and scene.solver.spectral_radius == 1.0
+        findings = [replace(one, steps=(*one.steps, WEAK)) if weak else one for one in verdict.findings]
         return Trajectory(
             engine=self.name,
             times=wanted,
@@ -131,12 +132,11 @@ class ExudynEngine(OneByOne):
             angles=verdict.angles[..., None],
             velocities=None if verdict.velocities is None else verdict.velocities[..., None],
             rates=None if verdict.rates is None else verdict.rates[..., None],
-            status=(verdict.status,),
             energy_drift=np.array([verdict.energy_drift]),
             constraint_drift=np.array([verdict.gap / machine.span]),
             steps=steps.count,
             wall_s=time.perf_counter() - started,
-            message=f"{verdict.message}{WEAK}" if weak else verdict.message,
+            lane_findings=[findings],
             model=self._model(exu, machine, steps) | facts(scene, machine.scene.initial, machine.span),
         )
 

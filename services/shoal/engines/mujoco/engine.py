@@ -16,10 +16,12 @@ from shoal.engines.contract import Capabilities, sampling_times
 from shoal.engines.mujoco.mjcf import Mjcf
 from shoal.engines.one_by_one import OneByOne
 from shoal.errors import InputError
+from shoal.findings import Finding
+from shoal.mechanics import findings as kinds
 from shoal.mechanics.reach import span
 from shoal.mechanics.start.start import facts
 from shoal.scene import Scene
-from shoal.trajectory import Array, Status, Trajectory
+from shoal.trajectory import Array, Trajectory
 
 STABLE = 1.4
 """Of rates times step: half of what RK4 bears, as machines are stiffer elsewhere."""
@@ -70,23 +72,22 @@ class MujocoEngine(OneByOne):
         followed = not (model.neq or model.nu or scene.loads or np.any(model.dof_frictionloss))
         with quiet(mujoco):
             points, angles, drift, steps = _march(mujoco, model, data, scene, wanted)
-        status, message = Status.OK, ""
+        found: list[Finding] = []
         if not np.all(np.isfinite(points)):
-            status, message = Status.DIVERGED, "the motion is not finite; use a smaller solver.step"
+            found = [kinds.NOT_FINITE.found("the motion is not finite", "use a smaller solver.step")]
         elif followed and not drift <= scene.solver.energy_tolerance:
-            status, message = Status.ENERGY, f"energy is off by {drift:.3g}; reduce solver.step"
+            found = [kinds.ENERGY.found(f"energy is off by {drift:.3g}", "reduce solver.step", drift=drift)]
         return Trajectory(
             engine=self.name,
             times=wanted,
             markers=tuple(scene.markers),
             points=points[..., : scene.dimensions, None],
             angles=angles[..., None],
-            status=(status,),
             energy_drift=np.array([drift if followed else np.nan]),
             constraint_drift=np.zeros(1),
             steps=steps,
             wall_s=time.perf_counter() - started,
-            message=message,
+            lane_findings=[found],
             model={"mujoco": mujoco.__version__, "unknowns": int(model.nv), "constraints": int(model.neq),
                    "integrator": "rk4", "step": scene.solver.step} | facts(scene, machine.initial, span(scene)),
         )  # fmt: skip

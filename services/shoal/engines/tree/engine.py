@@ -16,10 +16,12 @@ from shoal.engines.tree.scene import SceneTree
 from shoal.engines.tree.tableau import DOPRI853, RK4
 from shoal.engines.tree.tree import Tree, room
 from shoal.errors import InputError
+from shoal.findings import Finding
+from shoal.mechanics import findings as kinds
 from shoal.mechanics.reach import span
 from shoal.mechanics.start.start import facts
 from shoal.scene import Attachment, Scene
-from shoal.trajectory import Array, Status, Trajectory
+from shoal.trajectory import Array, Trajectory
 
 LOOSEST, TIGHTEST = 1e-2, 1e-14
 BETWEEN = 0.01
@@ -66,7 +68,7 @@ class TreeEngine(OneByOne):
             machine.tree, room(machine.tree), RK4 if step else DOPRI853, state, instants, step or 0.0, tolerance or 0.0
         )
         drift = _relative(machine.tree, record)
-        status, message = _verdict(record, instants, drift, solver.energy_tolerance)
+        findings = _findings(record, instants, drift, solver.energy_tolerance)
         rows = np.searchsorted(instants, wanted)
         points = np.stack([_point(machine, record, at) for at in scene.markers.values()], axis=1)
         angles = np.stack([_angle(machine, record, at.body) for at in scene.markers.values()], axis=1)
@@ -76,12 +78,11 @@ class TreeEngine(OneByOne):
             markers=tuple(scene.markers),
             points=points[rows, :, : scene.dimensions, None],
             angles=angles[rows][..., None],
-            status=(status,),
             energy_drift=np.array([drift]),
             constraint_drift=np.zeros(1),
             steps=int(record.facts[2]),
             wall_s=time.perf_counter() - started,
-            message=message,
+            lane_findings=[findings],
             model={"bodies": len(scene.bodies), "coordinates": len(machine.q), "rates": len(machine.v),
                    "integrator": "dop853" if controlled else "rk4", "step": step, "tolerance": tolerance,
                    "steps_refused": int(record.facts[3]), "unknowns": len(machine.v), "constraints": 0}
@@ -109,14 +110,18 @@ def _relative(tree: Tree, record: TreeRun) -> float:
     return float(record.facts[0] / np.maximum(record.facts[1], floor))
 
 
-def _verdict(record: TreeRun, times: Array, drift: float, allowed: float) -> tuple[Status, str]:
+def _findings(record: TreeRun, times: Array, drift: float, allowed: float) -> list[Finding]:
     error, _, steps, _, reached = record.facts
     if not np.isfinite(error):
-        return Status.DIVERGED, f"the motion is not finite after {reached:.6g} s; use a smaller step"
+        text = f"the motion is not finite after {reached:.6g} s"
+        return [kinds.NOT_FINITE.found(text, "use a smaller step", time=reached)]
     if not np.all(np.isfinite(record.states)):
         if steps >= MAXIMAL_STEPS:
-            return Status.FAILED, f"{MAXIMAL_STEPS} steps reach only {reached:.6g} s of {times[-1]:.6g} s"
-        return Status.DIVERGED, f"no step is short enough after {reached:.6g} s; use a larger tolerance"
+            text = f"{MAXIMAL_STEPS} steps reach only {reached:.6g} s of {times[-1]:.6g} s"
+            return [kinds.STEPS_EXHAUSTED.found(text, steps=steps, time=reached)]
+        text = f"no step is short enough after {reached:.6g} s"
+        return [kinds.NOT_FINITE.found(text, "use a larger tolerance", time=reached)]
     if not drift <= allowed:
-        return Status.ENERGY, f"energy is off by {drift:.2g}, allowed {allowed:g} (relative)"
-    return Status.OK, ""
+        text = f"energy is off by {drift:.2g}, allowed {allowed:g} (relative)"
+        return [kinds.ENERGY.found(text, drift=drift, allowed=allowed)]
+    return []

@@ -26,8 +26,9 @@ from shoal.identification.recording.measurement import Measurement, Recording
 from shoal.identification.recording.source import Channel, EngineSource
 from shoal.identification.uncertainty.sensitivity import sensitivity
 from shoal.identification.uncertainty.uncertain_inputs import taken_as_given
+from shoal.json_values import plain
 from shoal.scene import Scene
-from shoal.trajectory import Array, plain
+from shoal.trajectory import Array
 
 ABOUT = ("answer", "start")
 _DURATIONS = (0.25, 0.5, 1.0, 1.5, 2.0)

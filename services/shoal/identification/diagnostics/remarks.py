@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from shoal.engines.verification import SMALLER
 from shoal.findings import Finding
 from shoal.identification import findings as kinds
 from shoal.identification.diagnostics.residual_tests import ResidualTests
 from shoal.identification.uncertainty.intervals import Value
 from shoal.identification.uncertainty.profiles import Profile
+from shoal.mechanics.findings import SMALLER
 
 _NOTICED = 0.1
 """Of half an interval: a contribution to it that is worth a word."""

@@ -13,7 +13,8 @@ from shoal.identification.methods.outcome import GROSS, NOISES
 from shoal.identification.recording.units import of_channels
 from shoal.identification.uncertainty.chances import above_chi_square
 from shoal.identification.uncertainty.covariance import DOUBT, Block, Noise
-from shoal.trajectory import Array, plain
+from shoal.json_values import plain
+from shoal.trajectory import Array
 
 _LOUD = 1.5
 """Times the stated noise: a white residual up to here is a noise that was stated too small, a larger one is not."""

@@ -12,7 +12,8 @@ from shoal.identification.deadline import TimeIsUp
 from shoal.identification.forward import AT_ONCE, ForwardModel
 from shoal.identification.methods.lanes import Descent, descend_each, differentiate_many
 from shoal.identification.recording.measurement import Recording
-from shoal.trajectory import Array, plain
+from shoal.json_values import plain
+from shoal.trajectory import Array
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,8 @@ from shoal.identification.uncertainty.covariance import Block
 from shoal.identification.uncertainty.density import Density, density
 from shoal.identification.uncertainty.intervals import Value
 from shoal.identification.uncertainty.linearisation import LEVEL, Linearisation
-from shoal.trajectory import Array, plain
+from shoal.json_values import plain
+from shoal.trajectory import Array
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -26,7 +26,8 @@ from shoal.identification.uncertainty.model_error import ModelError, model_error
 from shoal.identification.uncertainty.prediction_error import Fit, allowance, block_of, stated, unevenness
 from shoal.identification.uncertainty.sensitivity import AGREED, Sensitivity, sensitivity
 from shoal.identification.uncertainty.uncertain_inputs import EXACT, Given, uncertain_fields
-from shoal.trajectory import Array, plain
+from shoal.json_values import plain
+from shoal.trajectory import Array
 
 Mask = npt.NDArray[np.bool_]
 

@@ -20,7 +20,8 @@ from shoal.identification.methods.least_squares import differentiate
 from shoal.identification.uncertainty.intervals import Value
 from shoal.identification.uncertainty.linearisation import Linearisation, quantile, spread
 from shoal.identification.uncertainty.sensitivity import Sensitivity
-from shoal.trajectory import Array, plain
+from shoal.json_values import plain
+from shoal.trajectory import Array
 
 _POINTS = 14
 """On each side, at most."""

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from shoal.arguments import check, one_of
 from shoal.errors import ComputationError, InputError
+from shoal.findings import Concluded, Finding, Kind
 from shoal.mechanics.analysis import left_out
+from shoal.mechanics.analysis import modes_findings as kinds
 from shoal.mechanics.analysis.going_on import as_stated
 from shoal.mechanics.analysis.modes import ABOUT, Modes, modes_at_rest, modes_of_motion
+from shoal.mechanics.analysis.modes_findings import ModesStatus, status_of
 from shoal.mechanics.analysis.steady import steady_motion
 from shoal.mechanics.machine import Machine
 from shoal.scene import Scene
@@ -22,7 +25,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Campbell:
+class Campbell(Concluded):
     """Modes at speeds [rad/s] of the body that turns fastest at the start, whose rates are scaled to each.
 
     modes: at each speed, None where there is no steady motion; reasons: why not, by speed
@@ -37,30 +40,33 @@ class Campbell:
     @property
     def ok(self) -> bool:
         """Return whether modes are known at all speeds; a motion that grows is an answer here."""
-        return self.verdict[0] == "ok"
+        return self.status is ModesStatus.OK
 
     @property
-    def verdict(self) -> tuple[str, str]:
-        """The status (ok or that of the first speed without trusted modes), and why it is not ok."""
-        for speed, found in zip(self.speeds, self.modes, strict=True):
-            if found is None:
-                return "moving", f"at {speed:g} rad/s: {self.reasons[speed]}"
-            status, why = found.verdict
-            if status not in ("ok", "unstable"):
-                return status, f"at {speed:g} rad/s: {why}"
-        return "ok", ""
+    def status(self) -> ModesStatus:
+        """The worst status that the findings imply."""
+        return status_of(self.findings)
 
     @property
-    def message(self) -> str:
-        """Return why there are no modes, or the speeds at which a motion is unstable."""
-        grows = {
-            f"{speed:g}": next(mode.movers for mode in found.modes if mode.kind == "unstable")
-            for speed, found in zip(self.speeds, self.modes, strict=True)
-            if found is not None and found.verdict[0] == "unstable"
-        }
-        moving = "; ".join(dict.fromkeys(grows.values()))
-        unstable = f"a motion grows at {', '.join(grows)} rad/s, of {moving}" if grows else ""
-        return "; ".join(filter(None, (self.verdict[1], unstable)))
+    def findings(self) -> list[Finding]:  # type: ignore[override]
+        """Reasons not to trust the modes at some speeds, one of a kind, and the speeds at which a motion grows."""
+        found: dict[Kind, list[tuple[float, Finding]]] = {}
+        grows = {}
+        for speed, one in zip(self.speeds, self.modes, strict=True):
+            doubts = [kinds.NO_STEADY_MOTION.found(self.reasons[speed])] if one is None else one.findings
+            for doubt in doubts:
+                if doubt.kind is kinds.GROWS and one is not None:
+                    grows[f"{speed:g}"] = next(mode.movers for mode in one.modes if mode.kind == "unstable")
+                elif doubt.kind.implies:
+                    found.setdefault(doubt.kind, []).append((speed, doubt))
+        result = []
+        for each in found.values():
+            (speed, first), at = each[0], ", ".join(f"{speed:g}" for speed, _ in each)
+            result.append(replace(first, text=f"at {at} rad/s: {first.text}", numbers=first.numbers | {"speed": speed}))
+        if grows:
+            movers = "; ".join(dict.fromkeys(grows.values()))
+            result.append(kinds.GROWS_AT.found(f"a motion grows at {', '.join(grows)} rad/s, of {movers}"))
+        return result
 
     @property
     def critical_speeds(self) -> list[float]:
@@ -86,8 +92,10 @@ class Campbell:
     def to_json(self) -> dict[str, Any]:
         """Plain data, which `shoal modes --speeds ... --json` prints."""
         return {
-            "status": self.verdict[0],
+            "status": str(self.status),
             "message": self.message,
+            "advice": self.advice,
+            "findings": [one.to_json() for one in self.findings],
             "about": self.about,
             "critical_speeds": self.critical_speeds,
             "speeds": [

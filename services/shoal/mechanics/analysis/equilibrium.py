@@ -10,12 +10,12 @@ import numpy as np
 
 from shoal.error_budget import ErrorBudget, Grade
 from shoal.findings import Concluded, Finding
+from shoal.json_values import plain
 from shoal.mechanics.analysis.findings import EquilibriumStatus, status_of
 from shoal.mechanics.analysis.joint_reactions import Reactions
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
 from shoal.scene import Rod, Scene
-from shoal.trajectory import plain
 
 
 @dataclass(frozen=True, eq=False)

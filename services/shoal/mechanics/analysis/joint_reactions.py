@@ -7,6 +7,7 @@ norm is reported, torques over the machine's size as forces, and the joints whos
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -14,11 +15,15 @@ import numpy as np
 
 from shoal.error_budget import ErrorBudget
 from shoal.errors import InputError
+from shoal.findings import Concluded, Finding, worst_implied
+from shoal.json_values import plain
+from shoal.mechanics.analysis import reaction_findings as kinds
 from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.analysis.free_bodies import FreeBodies
 from shoal.mechanics.analysis.free_motion import FreeMotion
 from shoal.mechanics.analysis.freedom import Metric
 from shoal.mechanics.analysis.joint_forces import Component, components, displacements, friction, work
+from shoal.mechanics.analysis.reaction_findings import ReactionsStatus
 from shoal.mechanics.analysis.singular import SHARE, nearby_freedom
 from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import Array
@@ -26,7 +31,6 @@ from shoal.mechanics.reach import span
 from shoal.mechanics.rubbing import ROUNDS, SETTLED
 from shoal.scene import Attachment, Coupling, Revolute, Scene, Slider
 from shoal.scene.joints import places
-from shoal.trajectory import plain
 
 RANK = 1e-9
 BALANCED = 1e-6
@@ -54,14 +58,13 @@ class JointReaction:
 
 
 @dataclass(frozen=True)
-class Reactions:
+class Reactions(Concluded):
     """Reactions at one state.
 
     redundancy: number of independent self-stresses. constraints: those of the model that depend on others, at a
     neighbouring state as well. unbalanced: residual of the balances, relative to all forces. scale: size of all forces
-    on the bodies [N], torques by the machine's size. settled: whether the forces agree with those of another run,
-    if there was one (`reactions_verified`); message: why they do not. errors: of the forces at all
-    times [N], by source, the largest of all joints.
+    on the bodies [N], torques by the machine's size. remarks: on the agreement with other runs, if there were any
+    (`reactions_verified`). errors: of the forces at all times [N], by source, the largest of all joints.
     """
 
     time: float
@@ -70,21 +73,24 @@ class Reactions:
     constraints: tuple[str, ...]
     unbalanced: float
     scale: float = 0.0
-    settled: bool = True
-    message: str = ""
+    remarks: Sequence[Finding] = ()
     errors: ErrorBudget = field(default_factory=ErrorBudget)
 
     @property
     def ok(self) -> bool:
         """Return whether all bodies are balanced, by forces that do not depend on the steps."""
-        return self.status == "ok"
+        return self.status is ReactionsStatus.OK
 
     @property
-    def status(self) -> str:
-        """ok, unbalanced, or inaccurate: the forces depend on the steps."""
-        if not self.unbalanced < BALANCED:
-            return "unbalanced"
-        return "ok" if self.settled else "inaccurate"
+    def status(self) -> ReactionsStatus:
+        """The worst status that the findings imply."""
+        return worst_implied(self.findings, ReactionsStatus)
+
+    @property
+    def findings(self) -> list[Finding]:  # type: ignore[override]
+        """Whether the bodies are in balance, and what other runs show."""
+        off = kinds.UNBALANCED.found("the bodies are not in balance", residual=self.unbalanced)
+        return [*([] if self.unbalanced < BALANCED else [off]), *self.remarks]
 
     @property
     def not_unique(self) -> tuple[str, ...]:
@@ -108,8 +114,13 @@ class Reactions:
 def to_json(found: list[Reactions]) -> dict[str, Any]:
     """Return plain data of reactions at some times, with the first status that is not ok."""
     worst = next((one for one in found if not one.ok), found[0])
-    message = "the bodies are not in balance" if worst.status == "unbalanced" else worst.message
-    return {"status": worst.status, "message": message, "reactions": [one.to_json() for one in found]}
+    return {
+        "status": str(worst.status),
+        "message": worst.message,
+        "advice": worst.advice,
+        "findings": [one.to_json() for one in worst.findings],
+        "reactions": [one.to_json() for one in found],
+    }
 
 
 class Exerted(NamedTuple):

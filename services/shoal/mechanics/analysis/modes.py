@@ -7,7 +7,7 @@ equilibrium these are the motions relative to its fall. Dry friction is left out
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -17,14 +17,18 @@ import numpy.typing as npt
 from shoal.arguments import check, one_of
 from shoal.error_budget import ErrorBudget
 from shoal.errors import ComputationError, InputError
+from shoal.findings import Concluded, Finding
+from shoal.json_values import plain
 from shoal.mechanics.affine import points
 from shoal.mechanics.analysis import left_out
+from shoal.mechanics.analysis import modes_findings as kinds
 from shoal.mechanics.analysis.at_rest import at_start
 from shoal.mechanics.analysis.balance import BALANCED, Balance
 from shoal.mechanics.analysis.damped import small
 from shoal.mechanics.analysis.equilibrium import Equilibrium
 from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.analysis.going_on import as_stated
+from shoal.mechanics.analysis.modes_findings import ModesStatus, status_of
 from shoal.mechanics.analysis.movers import movers
 from shoal.mechanics.analysis.singular import crossing
 from shoal.mechanics.analysis.small_motions import hides, pull
@@ -37,7 +41,6 @@ from shoal.mechanics.machine import Machine
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
 from shoal.scene import Scene
-from shoal.trajectory import plain
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -109,11 +112,11 @@ class Eigenmode:
 
 
 @dataclass(frozen=True, eq=False)
-class Modes:
+class Modes(Concluded):
     """The lowest modes about a state q, slowest first (unstable ones before all). balanced: whether forces balance.
 
-    speed: of the steady motion that they are about [rad/s], None at rest; moving: why the motion of the start, which is
-    left out, is no steady one. estimates: relative errors of the eigenvalues by source, (modes,): how far each is from
+    remarks: on the state that they are about. speed: of the steady motion that they are about [rad/s], None at rest.
+    estimates: relative errors of the eigenvalues by source, (modes,): how far each is from
     the limit of ever finer meshes, and from that with shear and rotary inertia, None where not known; None where
     none were looked for
     """
@@ -121,12 +124,11 @@ class Modes:
     scene: Scene
     about: str
     balanced: bool
-    message: str
+    remarks: Sequence[Finding]
     q: Array
     markers: tuple[str, ...]
     modes: tuple[Eigenmode, ...]
     speed: float | None = None
-    moving: str = ""
     estimates: Mapping[str, Array | None] | None = None
 
     @property
@@ -150,40 +152,36 @@ class Modes:
     @property
     def ok(self) -> bool:
         """Return whether the modes may be believed, and none grows."""
-        return self.verdict[0] == "ok"
+        return self.status is ModesStatus.OK
 
     @property
-    def verdict(self) -> tuple[str, str]:
-        """Return the status and why it is not ok.
+    def status(self) -> ModesStatus:
+        """The worst status that the findings imply."""
+        return status_of(self.findings)
 
-        Every status but ok has a reason, which names the modes that are concerned.
-        """
-        kinds = [mode.kind for mode in self.modes]
+    @property
+    def findings(self) -> list[Finding]:  # type: ignore[override]
+        """What was found out about the modes, which names those that are concerned, and about their state."""
+        found = []
+        if not self.balanced and self.about != "start":
+            found.append(kinds.UNBALANCED.found("the forces do not balance"))
+        growing = next((mode for mode in self.modes if mode.kind == "unstable"), None)
+        if growing is not None:
+            rate = growing.eigenvalue.real
+            text = f"it does not stay there: a motion of {growing.movers} grows with exp(t * {rate:.4g}/s)"
+            found.append(kinds.GROWS.found(text, rate=rate))
+        hidden = [number for number, mode in enumerate(self.modes, 1) if mode.kind == "untold"]
         coarse = [number for number, error in enumerate(self.mesh_errors, 1) if error > COARSE]
         unknown = [number for number, error in enumerate(self.errors, 1) if (error.total or 0.0) > COARSE]
-        if not self.balanced and self.about != "start":
-            return "unbalanced", "the forces do not balance"
-        if self.moving:
-            return "moving", f"{self.moving}; these modes are those at rest, which --speeds 0 takes as the answer"
-        if "unstable" in kinds:
-            mode = self.modes[kinds.index("unstable")]
-            growth = f"exp(t * {mode.eigenvalue.real:.4g}/s)"
-            return "unstable", f"it does not stay there: a motion of {mode.movers} grows with {growth}"
-        if "untold" in kinds:
-            numbers = [number for number, kind in enumerate(kinds, 1) if kind == "untold"]
-            return "cannot-be-told", f"round-off hides whether anything holds {_named(numbers)}"
-        if coarse:
-            return (
-                "coarse-mesh",
-                f"the mesh is too coarse for {_named(coarse)}; take more elements or a smaller --count",
-            )
-        if unknown:
-            return (
-                "beyond-theory",
-                f"slender rods leave out too much of {_named(unknown)}: shear and rotary inertia; take simo-reissner "
-                "rods or a smaller --count",
-            )
-        return "ok", ""
+        unknown = [number for number in unknown if number not in coarse]
+        for numbers, kind, text in (
+            (hidden, kinds.INDETERMINATE, "round-off hides whether anything holds {}"),
+            (coarse, kinds.COARSE, "the mesh is too coarse for {}"),
+            (unknown, kinds.BEYOND_THEORY, "slender rods leave out too much of {}: shear and rotary inertia"),
+        ):
+            if numbers:
+                found.append(kind.found(text.format(_named(numbers)), first=numbers[0], count=len(numbers)))
+        return [*found, *self.remarks]
 
     @property
     def frequencies(self) -> Array:
@@ -212,10 +210,11 @@ class Modes:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data, which `shoal modes --json` prints."""
-        status, why = self.verdict
         return {
-            "status": status,
-            "message": self.message if why in self.message else "; ".join(filter(None, (self.message, why))),
+            "status": str(self.status),
+            "message": self.message,
+            "advice": self.advice,
+            "findings": [one.to_json() for one in self.findings],
             "about": self.about,
             "balanced": self.balanced,
             "speed": self.speed,
@@ -256,36 +255,37 @@ def modes(
     """The lowest modes about the equilibrium, or about the start of the scene, with loads and drives at time [s].
 
     Where the start moves, they are those about its steady motion; where it moves otherwise, those at rest, which are
-    not the answer (see `Modes.verdict`). Raises InputError if the scene cannot be modelled, ComputationError if there
+    not the answer (see `Modes.status`). Raises InputError if the scene cannot be modelled, ComputationError if there
     is no equilibrium, it is singular, or small motions about a steady one are periodic in time.
     """
     one_of("about", about, ABOUT)
     check(time=time, count=count)
-    evaluator, moving = (at_start if about == "start" else as_stated)(scene, horizon=time), ""
+    evaluator, moving = (at_start if about == "start" else as_stated)(scene, horizon=time), list[Finding]()
     if is_moving(evaluator, time):
         q, v = (part[:, 0].copy() for part in (evaluator.model.q0, evaluator.model.v0))
         try:
             return modes_of_motion(scene, evaluator, q, v, about=about, time=time, count=count)[0]
         except NotSteadyError as error:
-            moving = f"{str(error).removeprefix(f'{scene.name}: ')}{_but_for_gravity(scene, about)}"
+            why = str(error).removeprefix(f"{scene.name}: ")
+            moving = [kinds.MOVING.found(f"{why}; these modes are those at rest", *_but_for_gravity(scene, about))]
     found = modes_at_rest(scene, about=about, time=time, count=count, leave_unstable=leave_unstable)
-    return replace(found, moving=moving)
+    return replace(found, remarks=[*moving, *found.remarks])
 
 
-def _but_for_gravity(scene: Scene, about: str) -> str:
+def _but_for_gravity(scene: Scene, about: str) -> list[str]:
     """Return advice for a motion that only gravity keeps from being steady, as of a horizontal flexible shaft."""
     if not np.any(scene.gravity):
-        return ""
+        return []
     try:
         weightless = scene.with_values({"gravity": [0.0] * scene.dimensions})
         evaluator = as_stated(weightless)
         q, v = (part[:, 0].copy() for part in (evaluator.model.q0, evaluator.model.v0))
         steady_motion(weightless, Machine.of(weightless).placement, evaluator, q, v, 0.0, seek=about == "equilibrium")
     except (ComputationError, InputError):
-        return ""
+        return []
     zeros = ",".join("0" * scene.dimensions)
     shaft = " (or take element ancf-cable for a shaft)" if scene.flexible_rods and scene.dimensions == 3 else ""
-    return f"; gravity alone acts against it: it is steady with --set gravity=[{zeros}]{shaft}"
+    return [f"gravity alone acts against it: it is steady with --set gravity=[{zeros}]{shaft}"]
 
 
 def is_moving(evaluator: Evaluator, time: float) -> bool:
@@ -301,13 +301,13 @@ def modes_at_rest(
     if about == "equilibrium":
         equilibrium = statics(scene, time, leave_unstable=leave_unstable, reactions=False)
         if not equilibrium.balanced:
-            raise ComputationError(f"{scene.name}: no equilibrium to vibrate about: {equilibrium.message}")
+            raise ComputationError(f"{scene.name}: no equilibrium to vibrate about: {equilibrium.explanation}")
         return modes_about(equilibrium, count=count)
     evaluator = at_start(scene, horizon=time)
     q, gap = _balance(scene, evaluator, time).restore(evaluator.model.q0[:, 0].copy())
     if gap > 1e-9:
         raise ComputationError(f"{scene.name}: the joints cannot be closed at the start; they gape by {gap:.2g}")
-    return _modes(scene, evaluator, q, time, count, "start", left_out.friction(scene, None))
+    return _modes(scene, evaluator, q, time, count, "start", _friction(scene))
 
 
 def modes_of_motion(
@@ -327,16 +327,21 @@ def modes_of_motion(
         for one in whirls(motion, placement)[:count]
     )
     axis = ", ".join(f"{part:.4g}" for part in np.round(motion.axis, 9) + 0.0)
-    parts = [f"about the steady motion at {motion.speed:.6g} rad/s about ({axis})" if motion.speed else
-             "about the steady motion that advances"]  # fmt: skip
+    how = f"at {motion.speed:.6g} rad/s about ({axis})" if motion.speed else "that advances"
+    remarks = [kinds.STEADY_MOTION.found(f"about the steady motion {how}", speed=motion.speed)]
     if motion.moved > MOVED * span(scene):
-        parts.append(f"its place is {motion.moved:.2g} m from the start")
+        text = f"its place is {motion.moved:.2g} m from the start"
+        remarks.append(kinds.ELSEWHERE.found(text, distance=float(motion.moved)))
     if any(mode.rotating for mode in told):
-        parts.append("frequencies of frame rotating are those in the turning frame")
-    if dry := left_out.friction(scene, None):
-        parts.append(dry)
+        remarks.append(kinds.TURNING_FRAME.found("frequencies of frame rotating are those in the turning frame"))
+    remarks += _friction(scene)
     markers = tuple(scene.markers)
-    return Modes(scene, about, True, "; ".join(parts), motion.q, markers, told, speed=motion.speed), motion
+    return Modes(scene, about, True, remarks, motion.q, markers, told, speed=motion.speed), motion
+
+
+def _friction(scene: Scene) -> list[Finding]:
+    dry = left_out.friction(scene, None)
+    return [kinds.FRICTION_LEFT_OUT.found(dry)] if dry else []
 
 
 def modes_about(equilibrium: Equilibrium, *, count: int = 10) -> Modes:
@@ -344,7 +349,8 @@ def modes_about(equilibrium: Equilibrium, *, count: int = 10) -> Modes:
     scene, time = equilibrium.scene, equilibrium.time
     evaluator = Evaluator.of(scene, horizon=time)
     evaluator.turns = start_angles(evaluator.model, [equilibrium.turns])[:, 0]
-    return _modes(scene, evaluator, equilibrium.q, time, count, "equilibrium", equilibrium.message)
+    remarks = [kinds.ABOUT_DOUBTED.found(one.text) if one.kind.implies else one for one in equilibrium.findings]
+    return _modes(scene, evaluator, equilibrium.q, time, count, "equilibrium", remarks)
 
 
 def _balance(scene: Scene, evaluator: Evaluator, time: float) -> Balance:
@@ -352,7 +358,9 @@ def _balance(scene: Scene, evaluator: Evaluator, time: float) -> Balance:
     return Balance(evaluator, time, span(scene), mass)
 
 
-def _modes(scene: Scene, evaluator: Evaluator, q: Array, time: float, count: int, about: str, message: str) -> Modes:
+def _modes(
+    scene: Scene, evaluator: Evaluator, q: Array, time: float, count: int, about: str, remarks: list[Finding]
+) -> Modes:
     balance = _balance(scene, evaluator, time)
     view = balance.look(q)
     if names := crossing(evaluator, balance.metric, view.freedom, q, time):
@@ -369,7 +377,7 @@ def _modes(scene: Scene, evaluator: Evaluator, q: Array, time: float, count: int
         for value, shape, unknown in list(zip(roots.values, roots.shapes.T, hidden, strict=True))[:count]
     )
     balanced = balance.residual(view) <= BALANCED
-    return Modes(scene, about, balanced, message, q, tuple(scene.markers), told)
+    return Modes(scene, about, balanced, remarks, q, tuple(scene.markers), told)
 
 
 def _named_movers(mode: Eigenmode, scene: Scene) -> Eigenmode:

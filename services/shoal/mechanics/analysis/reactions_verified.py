@@ -15,6 +15,8 @@ import numpy as np
 
 from shoal.error_budget import ErrorBudget
 from shoal.errors import ComputationError
+from shoal.findings import Finding
+from shoal.mechanics.analysis import reaction_findings as kinds
 from shoal.mechanics.analysis.joint_reactions import Reactions
 from shoal.mechanics.analysis.mesh_error import estimates
 from shoal.mechanics.analysis.reactions import reactions
@@ -38,11 +40,11 @@ _MOST = 200_000
 def verified(scene: Scene, times: Sequence[float]) -> list[Reactions]:
     """Reactions at times [s] with their errors. Raises InputError, ComputationError.
 
-    `settled` is false, and `message` says what to do, where no two runs with other steps agree within SHARE. Errors of
-    the mesh and of the theory of slender rods are added to those of the steps.
+    They are inaccurate where no two runs with other steps agree within SHARE. Errors of the mesh and
+    of the theory of slender rods are added to those of the steps.
     """
     stated = reactions(scene, times)
-    found, other, message = _in_time(stated, scene, times)
+    found, other, remarks = _in_time(stated, scene, times)
 
     def run(source: str, finer: Scene) -> list[Reactions]:
         # Elements of half the length need half the step.
@@ -53,22 +55,21 @@ def verified(scene: Scene, times: Sequence[float]) -> list[Reactions]:
     others = estimates(stated, scene, run, _differences, exact=False)
     errors = [{"time": one, **more} for one, more in zip(steps, others, strict=True)]
     largest = {source: _largest([one[source] for one in errors]) for source in errors[0]}
-    settled = not message or found is not stated
     return [
-        replace(_with_errors(one, each), settled=settled, message=message, errors=ErrorBudget(largest, "N"))
+        replace(_with_errors(one, each), remarks=remarks, errors=ErrorBudget(largest, "N"))
         for one, each in zip(found, errors, strict=True)
     ]
 
 
 def _in_time(
     stated: list[Reactions], scene: Scene, times: Sequence[float]
-) -> tuple[list[Reactions], list[Reactions] | None, str]:
+) -> tuple[list[Reactions], list[Reactions] | None, list[Finding]]:
     """Return the reactions that are believed most, those of the run that they are compared with, and what is wrong.
 
     All on the mesh as stated; no other run where there is none.
     """
     if not any(times):
-        return stated, stated, ""
+        return stated, stated, []
     runs, lever, off, why = [stated], span(scene), np.inf, ""
     for settings in _others(scene):
         try:
@@ -77,22 +78,20 @@ def _in_time(
             why = why or str(error)
             continue
         if _apart(stated, another, lever) <= SHARE:
-            return stated, another, ""
+            return stated, another, []
         off = min(off, _apart(stated, another, lever))
         if any(_apart(one, another, lever) <= SHARE for one in runs[1:]):
             nearest = min(runs[1:], key=lambda one: _apart(one, another, lever))
             name, tolerance = settings["solver.integrator"], settings["solver.relative_tolerance"]
-            return another, nearest, (
-                f"the run as stated is off by about {off:.0%} of the largest force; told are those with "
+            text = (
+                f"the run as stated is off by about {off:.0%} of the largest force; the forces are those with "
                 f"solver.integrator={name}, solver.relative_tolerance={tolerance:g}"
-            )  # fmt: skip
+            )
+            return another, nearest, [kinds.OTHER_RUN.found(text, off=off, relative_tolerance=tolerance)]
         runs.append(another)
     if len(runs) == 1:
-        return stated, None, f"errors of forces not estimated: {why}"
-    return stated, runs[-1], (
-        f"forces are off by about {off:.0%} of the largest: use a smaller solver.step, or solver.integrator=dop853 "
-        "with a smaller solver.relative_tolerance, or earlier times if the motion is chaotic"
-    )  # fmt: skip
+        return stated, None, [kinds.NOT_ESTIMATED.found(f"errors of forces not estimated: {why}")]
+    return stated, runs[-1], [kinds.INACCURATE.found(f"forces are off by about {off:.0%} of the largest", off=off)]
 
 
 def _others(scene: Scene) -> Iterator[dict[str, Any]]:

@@ -11,6 +11,7 @@ from scipy import special
 
 from shoal.error_budget import ErrorBudget
 from shoal.findings import Finding, message
+from shoal.json_values import plain
 from shoal.response import findings as kinds
 from shoal.response.enclosure import unseen
 from shoal.response.inputs import Inputs
@@ -18,7 +19,7 @@ from shoal.response.limits.estimate import ExceedanceEstimate
 from shoal.response.limits.exceedance import Exceedance
 from shoal.response.limits.form import DesignPoint
 from shoal.response.limits.limit import Limit, MarginErrors
-from shoal.trajectory import Array, plain
+from shoal.trajectory import Array
 
 NEARLY_SURE = 0.99
 """A limit that is exceeded with a higher probability may have been stated the other way round."""

@@ -48,6 +48,7 @@ def trajectory_table(trajectory: Trajectory, scene: Scene, selection: Selection 
     raised = f"; the inertia of {slowed} axial modes is raised to suit the step" if slowed else ""
     screen.say(f"{trajectory.steps} steps in {trajectory.wall_s * 1e3:.1f} ms{raised}")
     screen.say(*remarks(trajectory.model, trajectory.ok))
+    screen.findings(trajectory)
     screen.say(*estimates(trajectory))
 
 
@@ -140,14 +141,14 @@ def equilibrium_table(equilibrium: Equilibrium) -> None:
         reactions_table([equilibrium.reactions])
     lowest = equilibrium.eigenvalues[:1].real
     screen.say(
-        f"status {equilibrium.status}{f' ({equilibrium.message})' if equilibrium.message else ''}, "
+        f"status {equilibrium.status}, "
         f"{equilibrium.errors.brief}; "
         f"unbalanced {equilibrium.residual:.1e} of all forces, joints gape by {equilibrium.gap:.1e}"
         + "".join(f"; lowest eigenvalue {value:.4g} rad^2/s^2" for value in lowest)
         + f"; {equilibrium.iterations} iterations",
         style=screen.COLOURS[equilibrium.grade],
     )
-    screen.say(*(f"next: {step}" for step in equilibrium.advice))
+    screen.findings(equilibrium)
     if equilibrium.errors.estimates:
         screen.say(f"estimated error at the markers: {equilibrium.errors}")
 
@@ -173,7 +174,7 @@ def reactions_table(found: list[Reactions]) -> None:
             told = f"; among {among}" if among else ""
             told = told if reactions.constraints else "; none away from this position"
             screen.say(f"{reactions.redundancy} more than needed: least forces are shown{told}")
-    screen.say(*dict.fromkeys(one.message for one in found if one.ok and one.message))
+    screen.findings(next((one for one in found if not one.ok), found[0]))
     if found[0].errors.estimates:
         screen.say(f"estimated error of the forces, largest of all joints: {found[0].errors}")
 
@@ -204,6 +205,7 @@ def modes_table(modes: Modes | Campbell) -> None:
             table.add_row(*row)
         screen.out.print(table)
         screen.say(says(modes))
+        screen.say(*(f"next: {step}" for step in modes.advice))
         errors = [error for one in modes.modes if one for error in one.errors]
         if any(error.total is not None for error in errors):
             screen.say(f"estimated error of the eigenvalues, at most: {worst(errors)}")
@@ -222,8 +224,7 @@ def modes_table(modes: Modes | Campbell) -> None:
         error = [] if not known else ["-" if (off := modes.errors[number - 1].total) is None else f"{off:.1e}"]
         table.add_row(str(number), *(f"{value:.6g}" for value in numbers), mode.kind, *seen, *error)
     screen.out.print(table)
-    if modes.message:
-        screen.say(modes.message)
+    screen.findings(modes)
     if known:
         screen.say(f"estimated error of the eigenvalues, at most: {worst(modes.errors)}")
     if not modes.balanced:

@@ -66,8 +66,7 @@ def response_table(response: Response) -> None:
         f"{response.wall_s:.2f} s; {response.why}",
         style=screen.COLOURS[response.grade],
     )
-    screen.say(*(f"  {one.text}" for one in response.findings))
-    screen.say(*(f"next: {step}" for step in response.advice))
+    screen.findings(response)
     for joint in response.inputs.joints:
         if joint.left:
             screen.say(

@@ -1,0 +1,69 @@
+"""The status of modes and Campbell diagrams, and the kinds of findings that it follows from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from enum import StrEnum
+
+from shoal.findings import Finding, Kind, Severity, worst_implied
+
+
+class ModesStatus(StrEnum):
+    """Status of modes, the worst last. Only `ok` is accepted."""
+
+    OK = "ok"
+    BEYOND_THEORY = "beyond-theory"
+    COARSE = "coarse-mesh"
+    UNTOLD = "cannot-be-told"
+    UNSTABLE = "unstable"
+    MOVING = "moving"
+    UNBALANCED = "unbalanced"
+
+
+def status_of(findings: Iterable[Finding]) -> ModesStatus:
+    """Return the worst status that findings imply; ok where none implies any."""
+    return worst_implied(findings, ModesStatus)
+
+
+def _rejects(code: str, status: ModesStatus, meaning: str, remedy: str = "") -> Kind:
+    return Kind(code, Severity.REJECTION, meaning, remedy, status)
+
+
+UNBALANCED = _rejects(
+    "state-unbalanced", ModesStatus.UNBALANCED, "The forces do not balance in the state of the modes."
+)
+MOVING = _rejects(
+    "motion-left-out",
+    ModesStatus.MOVING,
+    "The start moves, and not steadily: the modes are those at rest.",
+    "take those at rest as the answer by --speeds 0",
+)
+NO_STEADY_MOTION = _rejects(
+    "no-steady-motion",
+    ModesStatus.MOVING,
+    "At a speed there is no steady motion, and there are no modes.",
+)
+GROWS = _rejects("mode-grows", ModesStatus.UNSTABLE, "A small motion grows.")
+INDETERMINATE = _rejects(
+    "mode-indeterminate", ModesStatus.UNTOLD, "The restoring force of a mode is below the round-off of the others."
+)
+COARSE = _rejects(
+    "mode-mesh-coarse",
+    ModesStatus.COARSE,
+    "The error of the mesh is more than half of an eigenvalue.",
+    "take more elements or a smaller --count",
+)
+BEYOND_THEORY = _rejects(
+    "mode-beyond-theory",
+    ModesStatus.BEYOND_THEORY,
+    "What slender rods leave out, shear and rotary inertia, is more than half of an eigenvalue.",
+    "take simo-reissner rods or a smaller --count",
+)
+STEADY_MOTION = Kind("about-steady-motion", Severity.NOTE, "The modes are about a steady motion, and which.")
+ELSEWHERE = Kind("steady-elsewhere", Severity.NOTE, "The steady motion is not where the start states it, but near.")
+TURNING_FRAME = Kind("turning-frame", Severity.NOTE, "Some frequencies are those in the turning frame.")
+ABOUT_DOUBTED = Kind(
+    "equilibrium-doubted", Severity.CAUTION, "The equilibrium that the modes are about is not stable or not unique."
+)
+FRICTION_LEFT_OUT = Kind("friction-left-out", Severity.CAUTION, "Dry friction is not part of small motions.")
+GROWS_AT = Kind("grows-at-speeds", Severity.NOTE, "At some speeds of the diagram a small motion grows.")

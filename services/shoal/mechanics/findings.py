@@ -1,0 +1,96 @@
+"""The kinds of findings about a motion, of every engine, from which its status follows."""
+
+from __future__ import annotations
+
+from shoal.findings import Kind, Severity
+from shoal.trajectory import Status
+
+
+def _rejects(code: str, status: Status, meaning: str, remedy: str = "") -> Kind:
+    return Kind(code, Severity.REJECTION, meaning, remedy, status)
+
+
+SMALLER = "a smaller solver.step, or solver.relative_tolerance and solver.absolute_tolerance"
+"""What cures a time error; the absolute tolerance is that of a motion of nanometres."""
+
+REFUSED = _rejects(
+    "refused-by-engine", Status.REFUSED, "The engine does not compute the values of this lane, or the scene at all."
+)
+NO_START = _rejects("no-start", Status.FAILED, "No start agrees with the joints and with what the scene states of it.")
+ENGINE_STOPPED = _rejects("engine-stopped", Status.FAILED, "The engine gave up before the end.")
+STEPS_EXHAUSTED = _rejects(
+    "steps-exhausted", Status.FAILED, "The most steps that are allowed end before the motion does."
+)
+SINGULAR = _rejects(
+    "creeps-at-singular-position",
+    Status.FAILED,
+    "Branches of the motion cross where the machine is, and the motion does not show which one it is on.",
+    "begin it farther away from that position, or with rates (initial, drives)",
+)
+NOT_FINITE = _rejects("not-finite", Status.DIVERGED, "The motion stops being finite.")
+TORN_OPEN = _rejects("joint-torn-open", Status.DIVERGED, "A joint opens without a drive, and the motion ends there.")
+NOT_CLOSED = _rejects("joint-not-closed", Status.DRIFTED, "A joint is open by more than the solver allows.")
+OUT_OF_REACH = _rejects(
+    "out-of-reach", Status.OUT_OF_REACH, "A marker is farther away than the lengths of the bodies allow."
+)
+ENERGY = _rejects(
+    "energy-not-balanced",
+    Status.ENERGY,
+    "The energy error, relative to the energy in motion, is beyond solver.energy_tolerance.",
+)
+CAREFUL_REJECTED = _rejects(
+    "careful-run-rejected",
+    Status.FAILED,
+    "A more careful run, which shows the error, is itself rejected.",
+    f"use {SMALLER}",
+)
+TIME_ERROR = _rejects(
+    "time-step-error",
+    Status.FAILED,
+    "A more careful run in time is more than a tenth of the machine's scale, or 0.1 rad, away.",
+    f"use {SMALLER}, or a shorter solver.duration if the motion is chaotic",
+)
+DIFFERS = _rejects(
+    "differs-from-native",
+    Status.FAILED,
+    "Another engine and the native solver are more than a tenth of the machine's scale, or 0.1 rad, apart.",
+    "see that the engine means the same by this scene, and use a smaller solver.step if it heeds that, or a shorter "
+    "solver.duration if the motion is chaotic",
+)
+MESH_ERROR = _rejects(
+    "mesh-too-coarse",
+    Status.FAILED,
+    "Runs on finer meshes are more than a tenth of the machine's scale away.",
+    "use more elements, or --tolerance to find them",
+)
+BENDING_ERROR = _rejects(
+    "bends-too-far",
+    Status.FAILED,
+    "Modal rods are for small bending, and cables in their place are more than a tenth of the scale away.",
+    "use element: ancf-cable",
+)
+TOLERANCE_NOT_MET = _rejects(
+    "tolerance-not-met", Status.FAILED, "No model that was run has an error within the tolerance."
+)
+NOT_ESTIMATED = Kind(
+    "error-not-estimated",
+    Severity.CAUTION,
+    "An error, of a source or of the chosen model, is not known.",
+)
+SHEAR_LEFT_OUT = Kind(
+    "shear-left-out",
+    Severity.CAUTION,
+    "Shear and rotary inertia, which slender rods leave out, move a marker by more than a hundredth of the scale.",
+)
+BENDS_FAR = Kind(
+    "bends-far", Severity.CAUTION, "That modal rods bend far moves a marker by more than a hundredth of the scale."
+)
+CREEPS = Kind(
+    "friction-creeps",
+    Severity.CAUTION,
+    "What dry friction should hold creeps by more than a hundredth of the scale.",
+    "lower coulomb_speed",
+)
+POINT_REJECTED = Kind(
+    "point-rejected", Severity.CAUTION, "A lane that was run alone with its errors estimated is rejected."
+)
