@@ -117,7 +117,7 @@ def fault(seed: int) -> str:
             judge is None
             or not judge.ok
             or turned(run, judge) > WRONG
-            or ("mesh error" in run.message and mesh_matters(scene, estimates["scale"]))
+            or ("mesh-too-coarse" in run.codes and mesh_matters(scene, estimates["scale"]))
         )
         return "" if right else f"{run.status[0]}: {run.message}"
     if estimates["time_error"] is None:

@@ -101,4 +101,4 @@ def test_a_run_that_creeps_names_the_singular_position() -> None:
     scene, _ = draw(0, 2, "0.3*t**3", {})
     run = GaussEngine().simulate(scene.with_values({"solver.max_steps": 3}), TIMES)
     assert not run.ok
-    assert "at a singular position" in run.message
+    assert run.codes == ["creeps-at-singular-position"]

@@ -12,6 +12,7 @@ from shoal.engines.verification import verified
 from shoal.errors import InputError
 from shoal.mechanics import fitting
 from shoal.mechanics.functions import value
+from shoal.mechanics.verdict import REACH
 from shoal.scene import Function, Scene
 
 GROUND = {"body": "ground", "point": [0.0, 0.0]}
@@ -85,4 +86,4 @@ def test_a_drive_that_asks_for_more_than_a_linkage_can_reach_is_named() -> None:
     scene = {"name": "four-bar", "gravity": [0.0, 0.0], "bodies": bodies, "joints": joints, "initial": start}
     run = get_engine("gauss").simulate(Scene.parse({**scene, "markers": {"B": ends["b"]}}))
     assert not run.ok
-    assert run.message.endswith("or let the drives ask for no more than the joints can reach")
+    assert run.advice[0].endswith(REACH)

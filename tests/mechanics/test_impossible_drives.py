@@ -24,8 +24,8 @@ def end(name: str) -> dict[str, Any]:
 
 
 def ended(run: Any) -> float:
-    """Return the instant in a message [s]."""
-    return float(run.message.split("from t = ")[1].split(" s on")[0])
+    """Return the instant of a finding [s]."""
+    return run.findings[0].numbers["time"]
 
 
 def four_bar(rng: np.random.Generator) -> tuple[dict[str, Any], float, float, float]:

@@ -56,7 +56,7 @@ def test_forces_of_steps_too_long_for_a_rod_are_those_of_more_careful_runs(modul
     assert np.max(np.abs(_forces(reactions(scene, TIMES)) - wanted)) > SHARE * np.max(np.abs(wanted))
     found = verified(scene, TIMES)
     assert all(one.ok for one in found), found[0].message
-    assert "the run as stated is off by about" in found[0].message
+    assert found[0].codes == ["forces-of-careful-run"]
     assert np.max(np.abs(_forces(found) - wanted)) < SHARE * np.max(np.abs(wanted))
 
 
@@ -73,7 +73,7 @@ def test_forces_that_no_two_runs_agree_about_are_inaccurate(monkeypatch: pytest.
     monkeypatch.setattr("shoal.mechanics.analysis.reactions_verified.reactions", drifting)
     report = to_json(verified(load_scene("single-pendulum"), [0.2]))
     assert report["status"] == "inaccurate"
-    assert "use a smaller solver.step, or solver.integrator=dop853" in report["message"]
+    assert [one["code"] for one in report["findings"]] == ["forces-inaccurate"]
     error = report["reactions"][0]["joints"]["O"]["force_error"]
     assert error >= SHARE * np.hypot(*report["reactions"][0]["joints"]["O"]["force"])
 

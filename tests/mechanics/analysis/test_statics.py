@@ -228,7 +228,7 @@ def test_inverted_pendulum_is_unstable_or_is_left() -> None:
     assert "rod" in standing.message
     found = _solved(scene)
     np.testing.assert_allclose(found.marker("tip"), [0.0, -1.0], atol=1e-9)
-    assert "unstable" in found.message
+    assert "unstable-left" in found.codes
 
 
 def test_what_nothing_holds_is_refused_by_name() -> None:
@@ -240,7 +240,7 @@ def test_what_nothing_holds_is_refused_by_name() -> None:
     falling["initial"]["rod"]["position"] = [0.0, 0.0]
     found = statics(Scene.parse(falling))
     assert found.status is EquilibriumStatus.UNHELD
-    assert "falls" in found.message
+    assert found.codes == ["falls-without-end"]
     assert not found.ok
 
 
@@ -265,7 +265,7 @@ def test_a_shallow_truss_snaps_through() -> None:
     rest = np.hypot(1.0, 0.3)
     y = brentq(lambda y: 100 * (1 - rest / np.hypot(1, y)) * y + 2.0, -1.0, -0.3, xtol=1e-14)
     np.testing.assert_allclose(found.marker("top"), [1.0, y], atol=1e-10)
-    assert "snapped" in found.message
+    assert "snapped" in found.codes
 
 
 @pytest.mark.parametrize("start", [3.0, -2.6, 0.4])
@@ -311,8 +311,7 @@ def test_what_turns_without_end_is_told_with_what_turns_it(load: dict[str, Any])
     """More than the weight can hold at any angle, m g L / 2 = 4.9 N m."""
     found = statics(_pendulum(0.0, loads={"drive": load}))
     assert found.status is EquilibriumStatus.UNHELD
-    assert "nothing holds rod against drive" in found.message
-    assert "turns" in found.message
+    assert found.codes == ["turns-without-end"]
 
 
 def test_commands_tell_a_stable_rest_from_an_answer_that_is_none() -> None:
