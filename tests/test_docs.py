@@ -275,6 +275,7 @@ def used(page: str, room: str, folder: Path, wanted: str) -> Any:
     return json.loads(done.stdout)
 
 
+@pytest.mark.slow
 def test_engine_of_its_page_agrees_with_ours(tmp_path: Path) -> None:
     wanted = "[largest, estimated, refusals]"
     largest, estimated, (kind, own) = used("extend/engine.md", "engines", tmp_path, wanted)

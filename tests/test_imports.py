@@ -6,6 +6,7 @@ import subprocess
 import sys
 
 import numpy as np
+import pytest
 
 FOREIGN = ("scipy", "pandas", "matplotlib", "prefect", "mlflow", "xarray", "casadi", "exudyn", "fastapi", "cma")
 RUN = """
@@ -57,6 +58,7 @@ def test_numba_looks_for_no_linear_algebra_before_a_kernel_wants_it() -> None:
     assert done.stdout == "False\n"
 
 
+@pytest.mark.slow
 def test_numba_finds_the_linear_algebra_of_scipy_when_a_kernel_wants_it() -> None:
     import shoal.mechanics.simulate  # noqa: F401 - puts it off
     from numba import njit
@@ -84,6 +86,7 @@ print(values[0])
 """
 
 
+@pytest.mark.slow
 def test_a_kernel_that_was_only_loaded_can_still_be_compiled_into_another() -> None:
     for _ in range(2):  # the first may have to compile it
         done = subprocess.run([sys.executable, "-c", LATER], capture_output=True, text=True, check=True)

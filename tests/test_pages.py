@@ -186,7 +186,7 @@ def check(page: str, folder: Path, *, night: bool) -> None:
 
 
 FIRST = "README.md"
-"""The page that is run by day; test_docs.py runs the tutorial and the notebook by day, with their figures."""
+"""The page that is run first; by day test_docs.py runs the tutorial and the notebook, with their figures."""
 
 
 def having(when: str) -> list[str]:
@@ -194,7 +194,8 @@ def having(when: str) -> list[str]:
     return [page for page in PAGES if any(b.language in RUN and b.when == when for b in blocks(page))]
 
 
-def test_the_readme_by_day(tmp_path: Path) -> None:
+@pytest.mark.slow
+def test_the_readme(tmp_path: Path) -> None:
     check(FIRST, tmp_path, night=False)
 
 

@@ -48,6 +48,7 @@ def check_page(page: str, nights: int) -> None:
         assert f"night-{clock(night):%Y-%m-%dT%H%M}" in page
 
 
+@pytest.mark.slow
 def test_nights_in_a_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SHOAL_HOME", str(tmp_path))
     nights = 4

@@ -21,6 +21,7 @@ STUDY = """uncertain:
 """
 
 
+@pytest.mark.slow
 def test_fit_carries_the_motion_of_what_it_found(fits: list[Fit]) -> None:
     fit = fits[0]
     assert fit.estimate.verdict.trusted

@@ -43,6 +43,7 @@ def silent(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     use(monkeypatch, f"http://127.0.0.1:{free_port()}")
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("silent")
 def test_a_study_waits_in_the_outbox_and_arrives_whole(
     comparison: Comparison, monkeypatch: pytest.MonkeyPatch, tmp_path: Path

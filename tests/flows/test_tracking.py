@@ -41,6 +41,7 @@ def children(client: Any, run_id: str) -> list[Any]:
     return list(client.search_runs([run.info.experiment_id], f"tags.`mlflow.parentRunId` = '{run_id}'"))
 
 
+@pytest.mark.slow
 def test_study_is_logged_with_a_child_per_fit(client: Any, fits: list[Fit], tmp_path: Path) -> None:
     albums = [pictures.album(fit) for fit in fits]
     some = next(iter(albums[0].pictures.values()))

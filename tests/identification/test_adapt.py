@@ -8,6 +8,7 @@ from shoal.errors import InputError
 from shoal.identification import Measurement, Verdict, identify, load_problem, measure
 
 
+@pytest.mark.slow
 def test_search_goes_by_a_coarse_model_and_ends_on_the_needed_one() -> None:
     problem = load_problem("paper-case-1")
     data = measure(problem, problem.load_scene())

@@ -50,6 +50,7 @@ def problem(folder: Path, **changes: Any) -> Problem:
     return Problem.parse({**stated, **changes}, "two")
 
 
+@pytest.mark.slow
 def test_a_sensor_that_is_late_beside_a_camera(tmp_path: Path) -> None:
     found = identify(problem(tmp_path))
     assert found.verdict is Verdict.IDENTIFIED

@@ -78,6 +78,7 @@ def test_length_and_spin_are_found_with_intervals_that_hold_them(problem: Proble
     assert found.fitness == pytest.approx(3 * NOISE**2, rel=0.25)
 
 
+@pytest.mark.slow
 def test_a_model_with_another_gravity_is_rejected_and_gravity_named(problem: Problem) -> None:
     found = found_by(problem, method="least-squares", values={"gravity": [0.0, 0.0, -12.0]})
     assert found.verdict == "model rejected"

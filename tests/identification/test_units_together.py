@@ -77,6 +77,7 @@ def identified(names: list[str], seed: int, tilt: float = 0.0, spring: float = 0
 CAMERA_AND_IMU, ENCODER_AND_IMU = ["x", "y", "ax", "ay", "rate"], ["ax", "ay", "rate", "angle"]
 
 
+@pytest.mark.slow
 def test_channels_count_by_the_noise_that_they_show() -> None:
     """The intervals are as if it were stated; a metre beside a metre per second squared did not count."""
     told, known = (identified(CAMERA_AND_IMU, 1, stated=stated) for stated in (False, True))

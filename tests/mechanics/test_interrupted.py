@@ -74,6 +74,7 @@ def test_a_run_is_interrupted(how: str) -> None:
     assert process.returncode == -signal.SIGINT
 
 
+@pytest.mark.slow
 def test_a_handler_of_the_users_own_decides() -> None:
     """It returns, so the run goes on, until the next signal is left to Python's own."""
     process = ended(SCENE + OWN_HANDLER)

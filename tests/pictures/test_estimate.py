@@ -30,6 +30,7 @@ from shoal.pictures.style import png
 from shoal.pictures.waterfall import waterfall
 
 
+@pytest.mark.slow
 def test_every_picture_is_drawn_without_warnings_labelled_and_described(several: Answer) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")

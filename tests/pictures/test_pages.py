@@ -11,6 +11,7 @@ import html5lib
 import pytest
 
 KINDS = ["estimate", "rejected", "study", "simulation", "selection"]
+COSTLY = "rejected", "study"
 
 
 def parsed(text: str) -> Element:
@@ -19,7 +20,7 @@ def parsed(text: str) -> Element:
     return tree
 
 
-@pytest.fixture(params=KINDS)
+@pytest.fixture(params=[pytest.param(kind, marks=[pytest.mark.slow] * (kind in COSTLY)) for kind in KINDS])
 def text(request: pytest.FixtureRequest, pages: Callable[[str], str]) -> str:
     return pages(request.param)
 

@@ -105,25 +105,6 @@ def test_the_schema_of_a_request_states_its_limits() -> None:
     assert found >= 20
 
 
-def test_the_forms_have_the_fields() -> None:
-    """But for what a flow states by parameters of its own."""
-    program = (
-        "from inspect import signature\n"
-        "from shoal_flows.flows import FLOWS\n"
-        "from shoal.requests.request import offered\n"
-        "own = {'identify': ({'methods', 'seeds'}, {'method', 'seed'}), 'export': ({'to', 'verify'}, set())}\n"
-        "for name, flow in FLOWS.items():\n"
-        "    if (request := getattr(flow.fn, 'request', None)) is not None:\n"
-        "        more, less = own.get(name, (set(), set()))\n"
-        "        stated = {*signature(flow.fn).parameters}\n"
-        "        assert stated == ({*offered(request, 'form')} - less) | more, (name, stated)\n"
-        "        print(name)\n"
-    )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr[-2000:]
-    assert len(done.stdout.split()) == 8
-
-
 FREE = [name for name in shoal.__all__ if inspect.isfunction(getattr(shoal, name)) and name not in ("plot", "identify")]
 
 

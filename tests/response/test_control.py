@@ -68,6 +68,7 @@ def test_the_share_that_may_be_unseen() -> None:
     assert unseen(0) == 1.0
 
 
+@pytest.mark.slow
 def test_a_peg_that_a_few_runs_miss_is_seen(tmp_path: Path) -> None:
     """12 % of the interval hit it and turn round, to x = -1.17 m by scipy; five runs say that x is 1 m everywhere."""
     file = tmp_path / "puck.yaml"

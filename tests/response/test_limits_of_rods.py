@@ -107,6 +107,7 @@ def test_sections_of_rods_in_space_are_those_of_cables_in_the_plane() -> None:
         np.testing.assert_allclose(found, wanted, atol=0.05 * np.max(np.abs(wanted)), err_msg=quantity)
 
 
+@pytest.mark.slow
 def test_the_energy_of_a_machine_that_bends() -> None:
     """It keeps what it has at the start, where its rods hang straight at some angle: weights alone."""
     scene, path = load_scene("flexible-double-pendulum"), "initial.OA.angle"

@@ -43,6 +43,7 @@ def holds(answer: ModelResponse, column: int, mean: float, std: float) -> None:
     assert answer.runs.evaluations <= 300
 
 
+@pytest.mark.slow
 def test_products_of_lognormal_variables() -> None:
     """A positive one, a negative one that is shared by two, and a sum, which is told as before."""
     answer = answered(

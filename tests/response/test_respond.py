@@ -146,6 +146,7 @@ def test_few_terms_of_many() -> None:
     assert answer.runs.evaluations <= 300
 
 
+@pytest.mark.slow
 def test_polynomials_that_run_away_outside_of_all_runs_are_seen() -> None:
     """Three oscillators after ten cycles: 32 terms of degree 20 tell 300 runs to 1 %, a deviation 13 % too large."""
     speeds = 60 * np.array([1.0, 1.1, 1.2])

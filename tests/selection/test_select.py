@@ -170,6 +170,7 @@ def test_a_torque_that_folds_a_rod_ends_the_search() -> None:
     assert not any("reissner" in candidate.name for candidate in found.candidates)
 
 
+@pytest.mark.slow
 def test_the_way_down_takes_a_share_of_the_work_of_the_climb(monkeypatch: pytest.MonkeyPatch) -> None:
     """But for the run that it is at when that much is done; what is found by then meets the tolerance."""
     scene = _with_modulus(2e7).with_values({"solver.duration": 0.2})

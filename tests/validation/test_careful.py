@@ -36,6 +36,7 @@ def test_a_system_that_is_put_back_moves_as_one_that_is_built_anew(scene: Scene)
     assert np.allclose(runs[1], anew.points[:, anew.markers.index("B"), :, 0], rtol=0.0, atol=1e-8)
 
 
+@pytest.mark.slow
 def test_both_find_the_angles_and_say_how_well(scene: Scene, measured: Any) -> None:
     noise = 1e-7 * np.random.default_rng(0).standard_normal(measured.shape)
     around = {

@@ -94,6 +94,7 @@ def test_each_kind_of_expectation_is_met_by_a_right_machine_and_charted(arm: Cal
     assert len(json.loads(held.file.read_text())["lines"][3]["points"]) == 100
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("within")
 def test_a_machine_that_is_not_as_expected_fails_and_the_night_says_since_when(
     arm: Callable[..., library.Entry], monkeypatch: pytest.MonkeyPatch

@@ -110,5 +110,6 @@ def test_told_errors_cover_the_true_ones(seed: int) -> None:
         assert 0 < true <= said
 
 
+@pytest.mark.slow
 def test_machines_whose_truth_takes_too_much_are_passed_over() -> None:
     assert judge(9, most=1.0) is None

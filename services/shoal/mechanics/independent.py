@@ -75,7 +75,7 @@ def _closed(c: Constraints, derived: Derived, q: Array, gap: Array) -> Array | N
 
     def correct(q: Array) -> tuple[Array, float]:
         slope, now = _linearised(c, derived, q)
-        back: Array = np.linalg.lstsq(slope, gap - now, DEPENDENT)[0]
+        back = np.asarray(np.linalg.lstsq(slope, gap - now, DEPENDENT)[0], dtype=float)
         return back, float(np.max(np.abs(back)))
 
     found, *_ = newton(correct, q, close=1e-14)
@@ -93,6 +93,6 @@ def _linearised(c: Constraints, derived: Derived, q: Array) -> tuple[Array, Arra
     slope = np.zeros((c.size, len(q)))
     slope[np.repeat(np.arange(c.size), np.diff(c.entry)), c.column] = entries
     products = c.factor[:, 0] * np.where(c.left < 0, 1.0, state[c.left]) * state[c.right]
-    gap: Array = np.bincount(np.repeat(np.arange(c.size), np.diff(c.start)), products, c.size)
+    gap = np.bincount(np.repeat(np.arange(c.size), np.diff(c.start)), products, c.size).astype(float)
     angles = np.arctan2(state[c.rising + 1], state[c.rising]) * c.share[:, 0]
     return slope, gap + np.bincount(np.repeat(np.arange(c.size), np.diff(c.turned)), angles, c.size)

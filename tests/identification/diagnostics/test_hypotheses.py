@@ -366,6 +366,7 @@ def test_a_short_hold_before_the_release_is_named(seed: int, tmp_path: Path) -> 
     assert named["delay"].value == pytest.approx(-hold, rel=0.35)
 
 
+@pytest.mark.slow
 def test_a_bound_that_excludes_the_truth_is_named_and_nothing_else(tmp_path: Path) -> None:
     rng = np.random.default_rng(4)
     machine = double(rng)

@@ -89,6 +89,7 @@ def test_two_that_contradict_each_other_and_right_ones() -> None:
     assert answer(a=swing(-0.4), b=swing(-0.9, seed=1)).verdict is Verdict.IDENTIFIED
 
 
+@pytest.mark.slow
 def test_a_prior_that_the_data_contradict_is_named() -> None:
     """The start is known to a milliradian, and stated a tenth of a radian off."""
     prior = {"mean": -0.5, "std": 1e-3}

@@ -73,6 +73,7 @@ def test_where_there_is_one_minimum_none_is_listed() -> None:
     assert false_minima(model, np.array(GENTLE)) == []
 
 
+@pytest.mark.slow
 def test_a_wrong_model_makes_it_try_the_others_and_name_them() -> None:
     model = forward(GENTLE, 3.0)
     wrong = ForwardModel(model.problem, model.scene.with_values({"gravity.1": -5.0}), model.engine, model.measurement)

@@ -74,6 +74,7 @@ def sampled(problem: Problem, measurement: Measurement, wanted: int = 2000, **ho
     return identify(problem, method="least-squares", measurement=measurement, options=options, **how)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_a_linear_model_with_stated_noise_has_the_posterior_of_its_closed_form(fall: str) -> None:
     problem, measurement = thrown(fall)
     mean, inverse, _ = least_squares(measurement)

@@ -65,6 +65,7 @@ def test_a_damped_swing_shows_friction_over_mass_only() -> None:
     assert f"m {estimate.parameters['m'].value:.6g} (not known)" in repr(estimate)
 
 
+@pytest.mark.slow
 def test_a_flexible_machine_shows_stiffness_over_density_only() -> None:
     """Data: CasADi's own beams."""
     problem = load_problem("paper-case-1-same-mesh")

@@ -41,6 +41,7 @@ def test_noise_is_found_behind_a_fit_that_follows_it() -> None:
     assert np.mean([seen.variance for seen in found]) == pytest.approx(1.0, abs=0.12)
 
 
+@pytest.mark.slow
 def test_mean_of_correlated_noise_has_the_uncertainty_it_scatters_with() -> None:
     count, rho = 400, 0.9
     block = Block(np.arange(count), np.ones(count - 1))

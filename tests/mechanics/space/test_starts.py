@@ -210,6 +210,7 @@ def rounded_pendulum(rng: np.random.Generator, digits: int) -> Scene:
     })  # fmt: skip
 
 
+@pytest.mark.slow
 def test_lanes_start_where_a_scene_by_itself_does_however_its_start_is_rounded() -> None:
     """Places of a file miss the joints by their last digit; what a single run corrects lanes correct too."""
     times = np.array([0.0, 0.05])

@@ -72,6 +72,7 @@ def test_a_wire_that_joints_press_is_an_elastica(element: str, kind: str, chord:
     assert height(scene) == pytest.approx(elastica(chord), rel=4e-3)
 
 
+@pytest.mark.slow
 def test_a_buckled_strip_stays_where_it_starts() -> None:
     """It bends about its softer axis, to the side of its positive y."""
     scene = between(0.9, "director-rod", "weld", height=H, width=W)
