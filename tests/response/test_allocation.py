@@ -339,7 +339,7 @@ def test_scaled_tolerances(marginal: Interval | Normal | Frozen) -> None:
     half = with_factors(inputs, np.array([0.5])).parameters[0].marginal
     assert isinstance(half, Scaled) is isinstance(marginal, Frozen)
     x = np.array([0.1, 0.5, 0.9])
-    assert half.value(half.germ(x)) - 2 == pytest.approx(0.5 * (marginal.value(marginal.germ(x)) - 2))
+    assert half.value(half.quantile(x)) - 2 == pytest.approx(0.5 * (marginal.value(marginal.quantile(x)) - 2))
 
 
 def test_the_worst_case_as_a_scene(tmp_path: Path) -> None:

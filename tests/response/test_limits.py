@@ -74,7 +74,7 @@ def test_a_design_point_around_which_no_run_passes_is_a_doubt(way: str) -> None:
     run = margins(lambda x: 2.995 - np.cos(15 * stats.norm.cdf(x) - 6).sum(axis=1), 3)
     found = probability(run, way, 0)
     assert found.estimate.probability == 0
-    assert found.estimate.told.startswith("below 0.00")
+    assert found.estimate.described.startswith("below 0.00")
     assert "none-exceeds-at-design-point" in [one.code for one in found.findings]
 
 
@@ -145,7 +145,7 @@ def test_a_quantity_that_does_not_vary_is_told() -> None:
     assert found.estimate.probability == 0.0
     assert "all stay 1 away from the limit: nothing that varies seems to change its quantity" in found.why
     varies = probability(margins(lambda x: 1 + x[:, 0] ** 2, 2), "auto", 0)
-    assert f"whose probability is {varies.estimate.told} or" in varies.why
+    assert f"whose probability is {varies.estimate.described} or" in varies.why
 
 
 def test_where_all_runs_pass_the_limit_some_others_may_not() -> None:
@@ -258,7 +258,7 @@ def test_a_double_pendulum_against_plain_sampling() -> None:
     auto, plain = (
         uncertain(scene, known, limit=[text], limit_method=way, limit_runs=runs, method="sobol", count=64, verify=False)
         .limits[0]
-        .passing
+        .exceedance
         for way, runs in (("auto", 5000), ("monte-carlo", 20_000))
     )
     assert auto is not None

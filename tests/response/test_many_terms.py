@@ -54,9 +54,9 @@ def test_waves_of_six_parameters_are_bounded_by_few_runs(seed: int) -> None:
 
 def test_the_likelihood_of_several_columns_has_the_slope_that_is_told() -> None:
     inputs, random = box(3), np.random.default_rng(0)
-    germs = random.uniform(-1, 1, (40, 3))
-    answers = np.stack([np.cos(germs @ [1.0, 0.5, 0.2]), np.exp(germs[:, 1])], axis=1)
-    bases, y = regularised._bases(inputs, germs), answers - answers.mean(axis=0)
+    xi = random.uniform(-1, 1, (40, 3))
+    answers = np.stack([np.cos(xi @ [1.0, 0.5, 0.2]), np.exp(xi[:, 1])], axis=1)
+    bases, y = regularised._bases(inputs, xi), answers - answers.mean(axis=0)
 
     def told(x: Array) -> tuple[float, Array]:
         return regularised._unlikely(regularised.Decay(x[:-1].reshape(3, 2), float(x[-1])), bases, y)
@@ -67,11 +67,11 @@ def test_the_likelihood_of_several_columns_has_the_slope_that_is_told() -> None:
 
 def test_runs_that_tell_a_term_nothing_are_said_to() -> None:
     inputs, terms = box(2), total_degree(2, 2)
-    germs = np.random.default_rng(1).uniform(-1, 1, (12, 2))
-    values = germs[:, :1] ** 2
-    assert fit(inputs, germs, values, terms).whole
-    germs[:, 1] = 0.5
-    assert not fit(inputs, germs, values, terms).whole
+    xi = np.random.default_rng(1).uniform(-1, 1, (12, 2))
+    values = xi[:, :1] ** 2
+    assert fit(inputs, xi, values, terms).whole
+    xi[:, 1] = 0.5
+    assert not fit(inputs, xi, values, terms).whole
 
 
 def test_a_peak_between_all_that_is_scanned_is_found_from_a_place_near_it() -> None:
@@ -80,13 +80,13 @@ def test_a_peak_between_all_that_is_scanned_is_found_from_a_place_near_it() -> N
     class Peaks:
         """A broad one in the middle, in one column half as high as the narrow one, in the other higher."""
 
-        def __call__(self, germs: Array) -> Array:
-            narrow = np.exp(-((germs - 0.4123) ** 2).sum(axis=1) / 2e-4)
-            broad = np.exp(-(germs**2).sum(axis=1))
+        def __call__(self, xi: Array) -> Array:
+            narrow = np.exp(-((xi - 0.4123) ** 2).sum(axis=1) / 2e-4)
+            broad = np.exp(-(xi**2).sum(axis=1))
             return np.stack([0.5 * broad + narrow, 3.0 * broad + narrow], axis=1)
 
-        def each(self, germs: Array, columns: IntArray) -> Array:
-            return self(germs)[np.arange(len(germs)), columns]
+        def each(self, xi: Array, columns: IntArray) -> Array:
+            return self(xi)[np.arange(len(xi)), columns]
 
     near = np.full((1, 4), 0.417)
     assert extremes(Peaks(), 4, 2, rough=True).upper == pytest.approx([0.5, 3.0], abs=1e-6)

@@ -112,7 +112,7 @@ def test_total_degree_takes_few_of_the_zeros() -> None:
     assert error(found, cubic, 4) < 1e-11
     assert runs.evaluations == 53
     zeros = np.cos((np.arange(4) + 0.5) * np.pi / 4)
-    assert np.abs(runs.germs[..., None] - zeros).min(axis=-1).max() < 1e-14
+    assert np.abs(runs.xi[..., None] - zeros).min(axis=-1).max() < 1e-14
 
 
 def test_density_of_greatest_entropy_with_two_moments_is_normal() -> None:

@@ -63,7 +63,7 @@ def test_bases_beside_chaospys(known: str) -> None:
         "data": (Empirical(data), None),
     }
     ours, theirs = pair[known]
-    x = ours.value(ours.germ(np.linspace(0.05, 0.95, 7)))
+    x = ours.value(ours.quantile(np.linspace(0.05, 0.95, 7)))
     if theirs is None:
         # Of observations: Cholesky's factor of their moments (arbitrary polynomial chaos by its definition).
         middle, size = data.mean(), data.std()

@@ -32,7 +32,7 @@ def test_problems_of_salib(kind: str) -> None:
     problem = {"num_vars": 1, "names": [MASS], "bounds": [bounds], "dists": [kind]}
     inputs = Inputs(parameters(problem, load_scene("single-pendulum")))
     marginal = inputs.parameters[0].marginal
-    assert marginal.value(marginal.germ(X)) == pytest.approx(exact.ppf(X))
+    assert marginal.value(marginal.quantile(X)) == pytest.approx(exact.ppf(X))
     if kind == "logunif":
         with pytest.raises(InputError, match="SALib has no distribution"):
             to_salib(inputs)
@@ -91,7 +91,7 @@ def test_distributions_of_openturns() -> None:
     scene = load_scene("single-pendulum")
     (one,) = parameters({MASS: Gumbel()}, scene)
     assert one.marginal.random
-    assert one.marginal.value(one.marginal.germ(X)) == pytest.approx(stats.gumbel_r(2.0, 0.1).ppf(X))
+    assert one.marginal.value(one.marginal.quantile(X)) == pytest.approx(stats.gumbel_r(2.0, 0.1).ppf(X))
     both = Gumbel()
     both.dimension = 2
     with pytest.raises(InputError, match="one variable"):
@@ -101,4 +101,4 @@ def test_distributions_of_openturns() -> None:
 def test_the_real_openturns() -> None:
     openturns = pytest.importorskip("openturns")
     (one,) = parameters({MASS: openturns.Gumbel(0.1, 2.0)}, load_scene("single-pendulum"))
-    assert one.marginal.value(one.marginal.germ(X)) == pytest.approx(stats.gumbel_r(2.0, 0.1).ppf(X))
+    assert one.marginal.value(one.marginal.quantile(X)) == pytest.approx(stats.gumbel_r(2.0, 0.1).ppf(X))

@@ -122,9 +122,9 @@ def test_a_limit_that_no_run_has_passed_is_drawn_below_what_it_may_be(way: str, 
         limit_method=way,
     )
     (judged,) = found.limits
-    assert judged.passing is not None
+    assert judged.exceedance is not None
     (axes,) = probability(judged).axes
-    most = judged.passing.estimate.interval[1][-1]
+    most = judged.exceedance.estimate.interval[1][-1]
     assert bool(most < 1) is known
     low, high = axes.get_ylim()
     assert -0.1 * most < low <= 0 < most <= high < 1.2 * most

@@ -50,8 +50,8 @@ def test_statistics_and_the_probability_of_a_limit_on_z() -> None:
     known = np.array([places(gravity)[:, 2] for gravity in np.linspace(LOW, HIGH, 2001)])
     assert found.column("A", "z", found.statistics.mean) == pytest.approx(known.mean(axis=0), abs=1e-6)
     (judged,) = found.limits
-    assert judged.passing is not None
-    low, high = (float(of[-1]) for of in judged.passing.estimate.interval)
+    assert judged.exceedance is not None
+    low, high = (float(of[-1]) for of in judged.exceedance.estimate.interval)
     assert low <= np.mean(np.any(known > bound, axis=1)) <= high
 
 

@@ -69,11 +69,11 @@ def of_response(found: Response) -> str:
         kept = f"{one.limit.verdict(one.kept)}{f' {looked_at(one.times)}' if one.kept else ''}"
         told = (
             kept
-            if one.passing is None
-            else f"{event} {looked_at(one.times)} with probability {one.passing.estimate.told}"
+            if one.exceedance is None
+            else f"{event} {looked_at(one.times)} with probability {one.exceedance.estimate.described}"
         )
         if one.between is not None:
-            least, largest = (each.told for each in one.estimates)
+            least, largest = (each.described for each in one.estimates)
             told = f"{event} {looked_at(one.times)} with a probability between {least} and {largest}"
         said.append(f"{one.limit.title}: {told}")
     return "\n\n".join([shown, *(one for one in said if one)])

@@ -59,8 +59,8 @@ def _figures(run: Run, found: Response) -> None:
                 run.series(f"{marker}.{quantity}/{name}", steps)
     for k, judged in enumerate(found.limits):
         run.params({f"limit.{k}": judged.limit.title})
-        if judged.passing is not None:
-            run.metric(f"final/limit.{k}/probability", judged.passing.estimate.probability)
+        if judged.exceedance is not None:
+            run.metric(f"final/limit.{k}/probability", judged.exceedance.estimate.probability)
         elif judged.between is not None:
             for side, chance in zip(("lower", "upper"), judged.between.estimates, strict=True):
                 run.metric(f"final/limit.{k}/probability_{side}", chance)

@@ -22,12 +22,12 @@ def probability(found: LimitResult) -> Figure:
     """
     figure, axes = canvas()
     estimates = found.estimates
-    seen = any((one.passed > 0).any() for one in estimates)
+    seen = any((one.exceeded > 0).any() for one in estimates)
     rare = seen and estimates[-1].probability < RARE
     labels = ["passed by then"] if len(estimates) == 1 else ["least probable", "most probable"]
     for estimate, label, colour in zip(estimates, labels, (BLUE, VERMILION), strict=False):
-        some = (estimate.passed > 0) | (not rare)
-        drawn = (np.where(some, of, np.nan) for of in (*estimate.interval, estimate.passed))
+        some = (estimate.exceeded > 0) | (not rare)
+        drawn = (np.where(some, of, np.nan) for of in (*estimate.interval, estimate.exceeded))
         low, high, passed = (np.broadcast_to(of, found.times.shape) for of in drawn)
         band(axes, found.times, low, high, color=colour, alpha=0.25, linewidth=0)
         if some.any():
@@ -35,7 +35,7 @@ def probability(found: LimitResult) -> Figure:
             curve(axes, found.times, passed, color=colour, label=label)
     most = estimates[-1]
     if not seen:
-        axes.text(0.5, 0.5, f"no run has passed it; {most.told}", ha="center", transform=axes.transAxes)
+        axes.text(0.5, 0.5, f"no run has passed it; {most.described}", ha="center", transform=axes.transAxes)
     if rare:
         least = min(one.probability for one in estimates if one.probability > 0)
         axes.set_yscale("log")
@@ -47,6 +47,6 @@ def probability(found: LimitResult) -> Figure:
     axes.set_ylabel("probability")
     if seen:
         axes.legend()
-    chances = " to ".join(one.told for one in estimates)
+    chances = " to ".join(one.described for one in estimates)
     headline(figure, f"{found.limit.excluded} happens with probability {chances}, {looked_at(found.times)}")
     return figure

@@ -89,14 +89,14 @@ def _limit(one: LimitResult) -> list[str]:
     how = "–" if shown is None else ", ".join(f"{name} = {value:.5g}" for name, value in shown.parameters.items())
     if one.between is not None:
         lower, upper = one.between.interval
-        chances = " to ".join(each.told for each in one.estimates)
+        chances = " to ".join(each.described for each in one.estimates)
         return [one.limit.title, chances, f"{lower:.3g} to {upper:.3g}", how]
-    if one.passing is None:
+    if one.exceedance is None:
         says = f"{one.limit.verdict(one.kept)}{f' {looked_at(one.times)}' if one.kept else ''}"
         error = f" ({one.errors.brief})" if one.errors.estimates else ""
         return [one.limit.title, says, f"{one.margin:.3g} {one.limit.unit}{error}", how]
     low, high = one.interval
-    return [one.limit.title, one.passing.estimate.told, f"{low:.3g} to {high:.3g}", how]
+    return [one.limit.title, one.exceedance.estimate.described, f"{low:.3g} to {high:.3g}", how]
 
 
 def _cases(found: Response) -> list[Worst]:
@@ -179,14 +179,14 @@ def _allocated(found: Response) -> list[str]:
     if told is None:
         return []
     return [
-        f"The {told.what} is {told.stated:.3g} with the stated tolerances and {told.reached} with those found, "
+        f"The {told.what} is {told.stated:.3g} with the stated tolerances and {told.confirmed_text} with those found, "
         f"which cost {told.cost:.3g} times as much.",
         f"To tighten first: {told.first or 'none'}.",
     ]
 
 
 def _remarks(found: Response) -> list[str]:
-    remarks = [f"{one.limit.title}: {one.passing.why}." for one in found.limits if one.passing is not None]
+    remarks = [f"{one.limit.title}: {one.exceedance.why}." for one in found.limits if one.exceedance is not None]
     for one in found.limits:
         if one.between is not None:
             for side, at in (("least", one.between.at_lower), ("most", one.between.at_upper)):

@@ -36,11 +36,11 @@ from shoal.response.allocation import (
     TARGET,
     TIGHTEST,
     Allocation,
-    Reached,
+    LeastMargin,
     accepted,
     costs_of,
     of_intervals,
-    passed,
+    unattainable,
     with_factors,
 )
 from shoal.response.assess import GAP, MORE, PLACES, between, bound_margins, options
@@ -118,11 +118,11 @@ def cheapest(cuts: list[Cut], costs: Array, beta: float, most: Array) -> Array:
 class Deciding:
     """What decides about the probability, and how the margin there falls as tolerances grow.
 
-    germ: of the intervals; place: of the random parameters; falls: if each tolerance doubles, to first order,
+    xi: of the intervals; place: of the random parameters; falls: if each tolerance doubles, to first order,
     (parameters,); beyond: by how much the reliability index may be less at other interval values
     """
 
-    germ: Array
+    xi: Array
     place: Nearest
     falls: Array
     beyond: float
@@ -196,9 +196,9 @@ def of_random(
     InputError, ComputationError.
     """
     model, seed = watched(machine, limit), how["seed"]
-    middle = model(inputs.values(_germs(inputs, np.zeros(int((~inputs.random).sum())), None)))
+    middle = model(inputs.values(_xi(inputs, np.zeros(int((~inputs.random).sum())), None)))
     if least(middle.values)[0] <= 0:
-        raise passed(limit.required)
+        raise unattainable(limit.required)
     chance = stated.estimates[-1].probability
     factors, spent, effects = np.ones(len(inputs)), 1, np.zeros(len(inputs))
     if chance > 0:
@@ -208,7 +208,7 @@ def of_random(
     wanted = -float(special.ndtri(target))
     aim = wanted
     cuts: dict[tuple[float, ...], Cut] = {}
-    told = list[Confirmed]()
+    confirmations = list[Confirmed]()
     for _ in range(ROUNDS):
         here = with_factors(inputs, factors)
         found, runs = _deciding(limit, machine, here, aim, seed)
@@ -219,7 +219,7 @@ def of_random(
             factors = np.maximum(0.5 * factors, TIGHTEST)
             continue
         # The margin at each corner of the intervals falls by slopes of its own.
-        cuts[tuple(np.sign(np.round(found.germ, 3)))] = cut
+        cuts[tuple(np.sign(np.round(found.xi, 3)))] = cut
         fresh = cheapest(list(cuts.values()), costs, aim, widest)
         settled = np.max(np.abs(fresh / factors - 1)) < SETTLED
         factors = fresh
@@ -227,16 +227,16 @@ def of_random(
             continue
         confirmed, runs = _confirmed(limit, machine, inputs, factors, found.beyond, **how)
         spent += runs
-        told.append(confirmed)
+        confirmations.append(confirmed)
         if confirmed.near(target) or (confirmed.kept(target) and np.all(factors >= widest)):
             break
         off = float(np.nan_to_num(-special.ndtri(confirmed.estimate.probability), posinf=FAR)) - wanted
         aim = max(aim - min(max(off - MARGIN, -1.0), 1.0), 0.1 * wanted)
-    if not told:
+    if not confirmations:
         confirmed, runs = _confirmed(limit, machine, inputs, factors, found.beyond, **how)
         spent += runs
-        told.append(confirmed)
-    best = min(told, key=lambda one: (not one.kept(target), float(costs @ (1 / one.factors))))
+        confirmations.append(confirmed)
+    best = min(confirmations, key=lambda one: (not one.kept(target), float(costs @ (1 / one.factors))))
     return Allocation(
         required=limit.required,
         inputs=inputs,
@@ -252,10 +252,10 @@ def of_random(
     )
 
 
-def _germs(inputs: Inputs, germ: Array, place: Array | None) -> Array:
+def _xi(inputs: Inputs, xi: Array, place: Array | None) -> Array:
     """Of all parameters, (1, parameters): those of the intervals, and of a place of the random ones or their middle."""
     found = np.zeros((1, len(inputs)))
-    found[0, ~inputs.random] = germ
+    found[0, ~inputs.random] = xi
     if inputs.random.any():
         random = inputs.some(inputs.random)
         found[:, inputs.random] = random.standard(np.zeros((1, len(random))) if place is None else place[None])
@@ -286,27 +286,28 @@ def _deciding(
         found = np.array([[near(values, k).margin] for k in range(len(next(iter(values.values()))))])
         return Answers(found, np.isfinite(found[:, 0]))
 
-    germ, beyond = np.zeros(0), 0.0
+    xi, beyond = np.zeros(0), 0.0
     if inputs.mixed:
         given = inputs.some(~inputs.random)
         answer = respond(margin, given, 1, gap=GAP, seed=seed, most=PLACES + MORE * len(given))
-        germ = answer.runs.germs[int(answer.runs.values[:, 0].argmin())]
-        place = near(given.values(germ[None]), on=on)
+        xi = answer.runs.xi[int(answer.runs.values[:, 0].argmin())]
+        place = near(given.values(xi[None]), on=on)
         assert answer.bounds is not None
         beyond = float(answer.bounds.lower[0] - answer.bounds.lower_outer[0]) / max(place.slope, 1e-300)
     else:
         place = near({}, on=on)
-    falls = _falls(watched(machine, limit), inputs, _germs(inputs, germ, place.place), place.instant)
-    return Deciding(germ, place, falls, beyond), made + 2 * len(inputs) + 1
+    falls = _falls(watched(machine, limit), inputs, _xi(inputs, xi, place.place), place.instant)
+    return Deciding(xi, place, falls, beyond), made + 2 * len(inputs) + 1
 
 
-def _falls(model: ResponseModel, inputs: Inputs, germs: Array, instant: int) -> Array:
-    """By how much the margin falls at germs, (1, parameters), if each tolerance doubles, to first order, (parameters,).
+def _falls(model: ResponseModel, inputs: Inputs, xi: Array, instant: int) -> Array:
+    """By how much the margin falls at standardised variables, (1, parameters), if each tolerance doubles, to first
+    order, (parameters,).
 
     From narrower ones, as wider ones may reach where the machine has no sense.
     """
     tried = [np.ones(len(inputs)), *(1 - share * row for share in (STEP, 2 * STEP) for row in np.eye(len(inputs)))]
-    runs = [with_factors(inputs, factors).values(germs) for factors in tried]
+    runs = [with_factors(inputs, factors).values(xi) for factors in tried]
     answers = model({path: np.concatenate([one[path] for one in runs]) for path in runs[0]})
     if not answers.good.all():
         raise ComputationError(f"allocate: runs beside the worst one failed: {answers.why}")
@@ -321,8 +322,8 @@ def _confirmed(
     here = with_factors(inputs, factors)
     if not inputs.mixed:
         margins = Margins(watched(machine, limit), here, MOST)
-        passing = probability(margins, "auto", how["seed"])
-        return Confirmed(factors, passing.estimate, passing.findings), margins.evaluations
+        exceedance = probability(margins, "auto", how["seed"])
+        return Confirmed(factors, exceedance.estimate, exceedance.findings), margins.evaluations
     found = between(limit, machine, here, **{**how, "verify": False, "progress": None})
     assert found.between is not None
     largest = found.between.upper
@@ -352,9 +353,9 @@ def _allocated(problem: UncertainProblem, stated: LimitResult) -> Allocation:
     # Tolerances that keep the limit keep it by the known error of the model.
     margins = watched(model, limit.tightened(stated.errors.total or 0.0))
 
-    def least(here: Inputs) -> Reached:
-        lower, outer, germs, evaluations, _ = bound_margins(problem, here, None)(margins, abs(limit.bound))
+    def least(here: Inputs) -> LeastMargin:
+        lower, outer, xi, evaluations, _ = bound_margins(problem, here, None)(margins, abs(limit.bound))
         worst = int(lower.argmin())
-        return Reached(float(outer.min()), float(lower[worst]), germs[worst], evaluations)
+        return LeastMargin(float(outer.min()), float(lower[worst]), xi[worst], evaluations)
 
     return of_intervals(limit.required, margins, inputs, least, prices, widest)

@@ -37,16 +37,16 @@ STEP = 0.02
 """Of differences, as a share of a tolerance that is stated."""
 TARGET = 1e-3
 """Probability of passing a limit, where none is stated."""
-Least = Callable[[Inputs], "Reached"]
+Least = Callable[[Inputs], "LeastMargin"]
 
 
 @dataclass(frozen=True)
-class Reached:
-    """Of intervals: the least margin that may be, by outer bounds, and by a run; the germ of that run."""
+class LeastMargin:
+    """Of intervals: the least margin that may be, by outer bounds, and by a run; where that is."""
 
     outer: float
     attained: float
-    germ: Array
+    xi: Array
     evaluations: int
 
 
@@ -89,7 +89,7 @@ class Allocation:
         return "least margin" if not random.any() else "probability" if random.all() else "largest probability"
 
     @property
-    def reached(self) -> str:
+    def confirmed_text(self) -> str:
         """What is confirmed, and how well it is known, in words."""
         if self.interval is None or not np.all(np.isfinite(self.interval)):
             return f"{self.confirmed:.3g}"
@@ -104,16 +104,16 @@ class Allocation:
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
         random = bool(self.inputs.random.any())
-        told = "probability" if random else "margin"
+        quantity = "probability" if random else "margin"
         return dict(
             plain(
                 {
                     "require": self.required,
                     "status": "ok" if self.ok else "not-met",
                     "message": message(self.findings),
-                    f"{told}_stated": self.stated,
-                    f"{told}_allocated": self.confirmed,
-                    f"{told}_interval": self.interval,
+                    f"{quantity}_stated": self.stated,
+                    f"{quantity}_allocated": self.confirmed,
+                    f"{quantity}_interval": self.interval,
                     "target": self.target,
                     "cost": self.cost,
                     "evaluations": self.evaluations,
@@ -179,17 +179,17 @@ def of_intervals(text: str, model: Model, inputs: Inputs, least: Least, costs: A
     cuts: dict[tuple[float, ...], tuple[Array, float]] = {}
     for round_ in range(ROUNDS):
         here = with_factors(inputs, factors)
-        reached = least(here)
-        pull, runs = _pull(model, here, reached.germ, factors)
-        evaluations += reached.evaluations + runs
+        least_margin = least(here)
+        pull, runs = _pull(model, here, least_margin.xi, factors)
+        evaluations += least_margin.evaluations + runs
         if round_ == 0:
-            stated, effects = reached.attained, 0.01 * pull
+            stated, effects = least_margin.attained, 0.01 * pull
         # A margin is taken for linear in the tolerances; each corner of the box has its own.
-        room = reached.outer + float(pull @ factors)
-        cuts[tuple(np.sign(np.round(reached.germ, 3)))] = pull, room
+        room = least_margin.outer + float(pull @ factors)
+        cuts[tuple(np.sign(np.round(least_margin.xi, 3)))] = pull, room
         fresh = _within(list(cuts.values()), costs, most)
         if room <= 0:
-            raise passed(text)
+            raise unattainable(text)
         settled = np.max(np.abs(fresh / factors - 1)) < SETTLED
         factors = fresh
         if settled:
@@ -219,8 +219,8 @@ def _within(cuts: list[tuple[Array, float]], costs: Array, most: Array) -> Array
 
 
 def _outer(least: Least, inputs: Inputs) -> tuple[float, int]:
-    reached = least(inputs)
-    return reached.outer, reached.evaluations
+    least_margin = least(inputs)
+    return least_margin.outer, least_margin.evaluations
 
 
 def _shrunk(factors: Array, look: Callable[[Array], tuple[float, int]]) -> tuple[float, Array, int]:
@@ -234,23 +234,24 @@ def _shrunk(factors: Array, look: Callable[[Array], tuple[float, int]]) -> tuple
     return found, np.maximum(share * factors, TIGHTEST), evaluations
 
 
-def _pull(model: Model, inputs: Inputs, germ: Array, factors: Array) -> tuple[Array, int]:
+def _pull(model: Model, inputs: Inputs, xi: Array, factors: Array) -> tuple[Array, int]:
     """By how much the margin falls at the worst place where each tolerance grows, per factor, (parameters,), and runs.
 
-    The worst place moves outwards with the tolerance: d margin / d germ * germ / factor.
+    The worst place moves outwards with the tolerance: d margin / d xi * xi /
+    factor.
     """
-    runs = CachedModel(model, inputs, 2 * len(germ) + 1)
-    away = STEP * np.eye(len(germ))
-    runs.all(np.concatenate([germ[None], germ + away, germ - away]))
+    runs = CachedModel(model, inputs, 2 * len(xi) + 1)
+    away = STEP * np.eye(len(xi))
+    runs.all(np.concatenate([xi[None], xi + away, xi - away]))
     values = runs.values
-    if len(values) < 2 * len(germ) + 1:
+    if len(values) < 2 * len(xi) + 1:
         raise ComputationError(f"allocate: runs beside the worst one failed: {runs.why}")
     instant = int(values[0].argmin())
-    up, down = values[1 : 1 + len(germ), instant], values[1 + len(germ) :, instant]
-    return np.asarray(-(up - down) / (2 * STEP) * germ / factors), len(values)
+    up, down = values[1 : 1 + len(xi), instant], values[1 + len(xi) :, instant]
+    return np.asarray(-(up - down) / (2 * STEP) * xi / factors), len(values)
 
 
-def passed(text: str) -> ComputationError:
+def unattainable(text: str) -> ComputationError:
     """What to say of a requirement that no tolerances keep."""
     return ComputationError(f"allocate: {text} does not hold at the middle values, whatever the tolerances")
 
@@ -278,7 +279,7 @@ def accepted(scene: Scene, inputs: Inputs) -> Array:
 
 def _accepts(scene: Scene, one: UncertainParameter, factor: float) -> bool:
     marginal = scaled(one.marginal, factor)
-    ends = np.array([-1.0, 1.0]) if not marginal.random else marginal.germ(np.array([1e-12, 1 - 1e-12]))
+    ends = np.array([-1.0, 1.0]) if not marginal.random else marginal.quantile(np.array([1e-12, 1 - 1e-12]))
     try:
         for value in marginal.value(ends):
             scene.with_values({path: float(value) * share for path, share in one.factors.items()})

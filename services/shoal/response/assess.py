@@ -86,7 +86,7 @@ def bound_margins(problem: UncertainProblem, inputs: Inputs, gap: float | None) 
         if spread.max() <= UNRESOLVED * max(size, np.abs(values).max()):
             # No surrogate predicts the errors of a solver's steps: an energy that is the same in all runs.
             outer = bounds.lower - spread
-        return bounds.lower, outer, runs.germs[runs.values.argmin(axis=0)], runs.evaluations, runs.failed
+        return bounds.lower, outer, runs.xi[runs.values.argmin(axis=0)], runs.evaluations, runs.failed
 
     return reach
 
@@ -97,8 +97,8 @@ def allow_for_limits(
     """Return statistics whose errors allow for the probabilities of limits, and what they have missed."""
     missed = list[Finding]()
     for one in results:
-        if statistics is not None and one.passing is not None and not one.doubted:
-            statistics, more = allowing(statistics, problem.model, one.limit, one.passing.estimate)
+        if statistics is not None and one.exceedance is not None and not one.doubted:
+            statistics, more = allowing(statistics, problem.model, one.limit, one.exceedance.estimate)
             missed += more
     return statistics, missed
 
@@ -171,10 +171,10 @@ def searched(
         for k in range(len(found)):
             here = machine.at({path: float(at[k]) for path, at in values.items()})
             margins = Margins(watched(here, limit), random, few, _counting(progress, made))
-            passing = probability(margins, way, seed)
-            found[k] = np.clip(-special.ndtri(passing.estimate.probability), -FAR, FAR)
+            exceedance = probability(margins, way, seed)
+            found[k] = np.clip(-special.ndtri(exceedance.estimate.probability), -FAR, FAR)
             made, failed = made + margins.evaluations, failed + margins.failed
-            why = why or (passing.why if np.isnan(found[k, 0]) else "")
+            why = why or (exceedance.why if np.isnan(found[k, 0]) else "")
         return Answers(found, np.isfinite(found[:, 0]), 0, why)
 
     answer = respond(index, given, 1, gap=GAP, seed=seed, most=PLACES + MORE * len(given))
@@ -193,8 +193,8 @@ def _beyond(runs: CachedModel, seed: int) -> tuple[float, float]:
     study = Study(runs, np.zeros(1, dtype=np.int64), np.zeros(1), seed)
     surrogate = best(study)
     found = extremes(surrogate, len(runs.inputs), 1, seed)
-    told = enclosure(study, surrogate, found, surrogate.left_out)
-    return 0.0 if some else float(told.upper_outer[0] - told.upper[0]), float(told.lower[0] - told.lower_outer[0])
+    known = enclosure(study, surrogate, found, surrogate.left_out)
+    return 0.0 if some else float(known.upper_outer[0] - known.upper[0]), float(known.lower[0] - known.lower_outer[0])
 
 
 def _counting(progress: Callable[[int], None] | None, made: int) -> Callable[[int], None] | None:
@@ -212,44 +212,44 @@ def _no_reach(_: object, _size: float) -> tuple[Array, Array, Array, int, int]:
     raise AssertionError("all parameters are random here")
 
 
-def crosschecked(judged: LimitResult, machine: ResponseModel, values: Array, *, shared: bool) -> LimitResult:
+def crosschecked(assessed: LimitResult, machine: ResponseModel, values: Array, *, shared: bool) -> LimitResult:
     """Test a probability against the runs that estimated mean and standard deviation of the limit's quantity.
 
     values: (runs, columns); shared: whether runs share parameters with others, as those that tell indices do
     """
-    columns = _columns(machine, judged.limit)
-    if judged.passing is None or columns is None or not len(values):
-        return judged
-    share = 2 / (len(judged.inputs) + 2) if shared else 1.0
-    margins = judged.limit.margin(values[:, columns])
-    found = [*judged.passing.findings, *contradictions(judged.passing.estimate, margins, share)]
-    return replace(judged, passing=replace(judged.passing, findings=found))
+    columns = _columns(machine, assessed.limit)
+    if assessed.exceedance is None or columns is None or not len(values):
+        return assessed
+    share = 2 / (len(assessed.inputs) + 2) if shared else 1.0
+    margins = assessed.limit.margin(values[:, columns])
+    found = [*assessed.exceedance.findings, *contradictions(assessed.exceedance.estimate, margins, share)]
+    return replace(assessed, exceedance=replace(assessed.exceedance, findings=found))
 
 
 def allowing(
-    told: Statistics, machine: ResponseModel, limit: Limit, estimate: ExceedanceEstimate
+    known: Statistics, machine: ResponseModel, limit: Limit, estimate: ExceedanceEstimate
 ) -> tuple[Statistics, list[Finding]]:
     """Return statistics whose errors allow for the probability of a limit, and what they have missed, if anything."""
     columns = _columns(machine, limit)
     if columns is None:
-        return told, []
-    mean, least = shifts(limit, told.mean[columns], told.error[columns], estimate)
-    lacks = least > told.std[columns] + np.nan_to_num(told.std_error[columns])
+        return known, []
+    mean, least = shifts(limit, known.mean[columns], known.error[columns], estimate)
+    lacks = least > known.std[columns] + np.nan_to_num(known.std_error[columns])
     if not lacks.any():
-        return told, []
-    error, std_error = told.error.copy(), told.std_error.copy()
+        return known, []
+    error, std_error = known.error.copy(), known.std_error.copy()
     error[columns] = np.where(lacks, np.fmax(error[columns], mean), error[columns])
-    std_error[columns] = np.where(lacks, least - told.std[columns], std_error[columns])
+    std_error[columns] = np.where(lacks, least - known.std[columns], std_error[columns])
     k = int(np.where(lacks, least, 0.0).argmax())
     missed = kinds.RARE_MISSED.found(
         f"the standard deviation of {limit.place}.{limit.quantity} at {machine.times[k]:g} s is "
-        f"{told.std[columns][k]:.1e} by the runs, and what exceeds {limit.text} makes it {least[k]:.1e} at least, so "
+        f"{known.std[columns][k]:.1e} by the runs, and what exceeds {limit.text} makes it {least[k]:.1e} at least, so "
         "that the errors of mean and standard deviation are enlarged",
         time=float(machine.times[k]),
-        std=float(told.std[columns][k]),
+        std=float(known.std[columns][k]),
         least=float(least[k]),
     )
-    return replace(told, error=error, std_error=std_error), [missed]
+    return replace(known, error=error, std_error=std_error), [missed]
 
 
 def shifts(limit: Limit, mean: Array, error: Array, estimate: ExceedanceEstimate) -> tuple[Array, Array]:
@@ -260,7 +260,7 @@ def shifts(limit: Limit, mean: Array, error: Array, estimate: ExceedanceEstimate
     """
     lower, _ = ends(estimate)
     # To be passed for the first time is no more probable than to be beyond.
-    first = np.diff(estimate.passed, prepend=0.0)
+    first = np.diff(estimate.exceeded, prepend=0.0)
     p = np.clip(first * lower / estimate.probability, 0.0, 0.5) if estimate.probability > 0 else np.zeros(len(first))
     distance = np.maximum(limit.margin(mean) - np.nan_to_num(error), 0.0)
     if limit.absolute and limit.above:

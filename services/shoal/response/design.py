@@ -39,9 +39,9 @@ def box_places(inputs: Inputs, count: int, seed: int) -> Array:
     return np.concatenate(found)
 
 
-def telling(inputs: Inputs, germs: Array, terms: Terms, count: int, places: Array) -> Array:
-    """So many of these places, beside the runs at `germs`, (count, parameters)."""
-    known = inputs.basis(germs, terms)
+def telling(inputs: Inputs, xi: Array, terms: Terms, count: int, places: Array) -> Array:
+    """So many of these places, beside the runs at `xi`, (count, parameters)."""
+    known = inputs.basis(xi, terms)
     factor = np.linalg.cholesky(known.T @ known + UNKNOWN * np.eye(len(terms)))
     # Rows in which what is known has the unit matrix: their squares tell how little is known at a place.
     rows = solve_triangular(factor, inputs.basis(places, terms).T, lower=True).T
@@ -58,15 +58,15 @@ def telling(inputs: Inputs, germs: Array, terms: Terms, count: int, places: Arra
     return np.asarray(places[chosen])
 
 
-def box_design(inputs: Inputs, germs: Array, terms: Terms, count: int, seed: int) -> Array:
-    """So many places in the box of intervals for these terms, beside the runs at `germs`."""
+def box_design(inputs: Inputs, xi: Array, terms: Terms, count: int, seed: int) -> Array:
+    """So many places in the box of intervals for these terms, beside the runs at `xi`."""
     if count <= 0:
         return np.empty((0, len(inputs)))
     places = box_places(inputs, max(FEWEST, CHOICE * len(terms)), seed)
     apart = np.full(len(places), np.inf)
-    for germ in germs:
-        apart = np.minimum(apart, np.abs(places - germ).max(axis=1))
-    return telling(inputs, germs, terms, count, places[apart > 1e-3])
+    for known in xi:
+        apart = np.minimum(apart, np.abs(places - known).max(axis=1))
+    return telling(inputs, xi, terms, count, places[apart > 1e-3])
 
 
 MOST_ACTIVE = 10
@@ -112,14 +112,14 @@ class Screened:
 
 def screened(study: Study) -> Screened:
     """After the runs of a star: the centre and both ends of every axis."""
-    parameters, germs, values = len(study.inputs), study.runs.germs, study.runs.values
+    parameters, xi, values = len(study.inputs), study.runs.xi, study.runs.values
     everyone = np.ones(parameters, dtype=bool)
     if parameters <= MOST_ACTIVE:
         return Screened(study, everyone)
     arms = np.zeros((parameters, values.shape[1]))
-    middle = values[np.abs(germs).max(axis=1).argmin()]
+    middle = values[np.abs(xi).max(axis=1).argmin()]
     for k, unit in enumerate(np.eye(parameters)):
-        beside = (germs == unit).all(axis=1) | (germs == -unit).all(axis=1)
+        beside = (xi == unit).all(axis=1) | (xi == -unit).all(axis=1)
         # What failed at both ends may do anything.
         arms[k] = (
             np.abs(values[beside] - middle).max(axis=0) if beside.any() else values.max(axis=0) - values.min(axis=0)

@@ -24,7 +24,7 @@ from shoal.response.expansion import Expansion
 from shoal.response.extremes import Extremes, Surrogate, extremes, in_parts, places
 from shoal.response.inputs import BoolArray, IntArray
 from shoal.response.runs import TooManyRunsError
-from shoal.response.study import FINE_GAP, SAFETY, Enclosure, Found, Looked, Study
+from shoal.response.study import FINE_GAP, SAFETY, DatedEnclosure, Enclosure, Found, Study
 from shoal.trajectory import Array
 
 CONTROLS = 64
@@ -46,11 +46,11 @@ def control_misses(study: Study, surrogate: Surrogate) -> Array:
 
     Raises TooManyRunsError, InputError.
     """
-    runs, made = study.runs, len(study.runs.germs)
+    runs, made = study.runs, len(study.runs.xi)
     count = min(CONTROLS, runs.left)
     if count:
         runs.controls += runs.all(study.inputs.sobol(count, study.seed + 5, runs.controls))
-    return np.asarray(np.abs(surrogate(runs.germs[made:]) - runs.values[made:]).max(axis=0, initial=0.0))
+    return np.asarray(np.abs(surrogate(runs.xi[made:]) - runs.values[made:]).max(axis=0, initial=0.0))
 
 
 def contradicts(study: Study, missed: Array, error: Array) -> BoolArray:
@@ -58,16 +58,16 @@ def contradicts(study: Study, missed: Array, error: Array) -> BoolArray:
     return np.asarray(missed > SAFETY * error + FINE_GAP * study.widths(study.runs.values))
 
 
-def with_controls(study: Study, looked: Looked | None) -> Looked | None:
+def with_controls(study: Study, enclosed: DatedEnclosure | None) -> DatedEnclosure | None:
     """Bounds with runs that they foretold."""
-    if looked is None:
+    if enclosed is None:
         return None
-    values, told = study.runs.values, looked.told
+    values, now = study.runs.values, enclosed.enclosure
     lower, upper = values.min(axis=0), values.max(axis=0)
-    low, high = np.minimum(told.lower_outer, lower), np.maximum(told.upper_outer, upper)
+    low, high = np.minimum(now.lower_outer, lower), np.maximum(now.upper_outer, upper)
     width, beyond = study.widths(values), np.maximum(lower - low, high - upper)
     gap = np.divide(beyond, width, out=np.zeros_like(beyond), where=width > 0)
-    return Looked(study.runs.evaluations, Enclosure(lower, upper, low, high, gap))
+    return DatedEnclosure(study.runs.evaluations, Enclosure(lower, upper, low, high, gap))
 
 
 Look = Literal["there", "scanned", "everywhere"]
@@ -94,13 +94,13 @@ def enclosure(
     return Enclosure(lower, upper, low, high, gap)
 
 
-def looked_at(study: Study, surrogate: Surrogate, error: Array) -> Looked:
+def enclose(study: Study, surrogate: Surrogate, error: Array) -> DatedEnclosure:
     """Bounds by all runs there are; error: see `enclosure`."""
     named = extremes(surrogate, len(study.inputs), len(error), study.seed, known=study.runs.attaining)
-    return Looked(study.runs.evaluations, enclosure(study, surrogate, named, error))
+    return DatedEnclosure(study.runs.evaluations, enclosure(study, surrogate, named, error))
 
 
-def foretold(study: Study, _: Surrogate, found: Extremes, error: Array) -> Enclosure:
+def enclosure_of_cycles(study: Study, _: Surrogate, found: Extremes, error: Array) -> Enclosure:
     """Bounds that runs attain, and outer ones by what a surrogate foretells at its extremes.
 
     error: of the surrogate at runs that it had not seen, (columns,)
@@ -120,9 +120,9 @@ def _widened(
 
     The margin grows away from runs, so that an extreme may move off the surrogate's own: sought along the axes.
     """
-    germs, columns = study.runs.germs, len(margin)
-    every, runs = np.arange(columns), cKDTree(np.arccos(germs))
-    misfit = np.abs(surrogate(germs) - study.runs.values)
+    xi, columns = study.runs.xi, len(margin)
+    every, runs = np.arange(columns), cKDTree(np.arccos(xi))
+    misfit = np.abs(surrogate(xi) - study.runs.values)
     which, signs = np.tile(every, 2), np.repeat([1.0, -1.0], columns)
 
     def away(at: Array) -> tuple[Array, IntArray]:
@@ -140,12 +140,12 @@ def _widened(
     if look == "there":
         return best[:columns], -best[columns:]
     rough = look == "scanned"
-    scanned = places(germs.shape[1], study.seed, rough=rough)
+    scanned = places(xi.shape[1], study.seed, rough=rough)
     share, run = away(scanned)
-    for some, told in in_parts(surrogate, scanned, columns):
+    for some, answers in in_parts(surrogate, scanned, columns):
         wide = share[some, None] * margin
         wide += misfit[run[some]]
-        for side, of in enumerate((told - wide, told + wide)):
+        for side, of in enumerate((answers - wide, answers + wide)):
             every_place = np.ascontiguousarray(of.T)
             extreme = every_place.argmax(axis=1) if side else every_place.argmin(axis=1)
             value = (-1 if side else 1) * every_place[every, extreme]
@@ -156,7 +156,7 @@ def _widened(
     for at in starts:
         value = best.copy() if at is place else objective(at)
         for step in () if rough else (arm / slope for arm in ARMS):
-            for axis in range(germs.shape[1]):
+            for axis in range(xi.shape[1]):
                 for way in (-step, step):
                     beside = at.copy()
                     beside[:, axis] = np.cos(np.clip(np.arccos(beside[:, axis]) + way, 0, np.pi))
@@ -207,35 +207,35 @@ def bounds_of(study: Study, found: Found) -> Bounds:
     """Attained bounds of all runs, after the extremal points of the surrogate are run, and outer ones by its error."""
     runs, error, surrogate = study.runs, found.error, found.surrogate
     named = None
-    known = found.looked is not None and found.looked.runs == runs.evaluations
+    known = found.enclosed is not None and found.enclosed.runs == runs.evaluations
     if surrogate is not None and not known:
         # Over many cycles there are many extremes.
-        how = (SEARCHES, error) if found.foretold else (1, None)
+        how = (SEARCHES, error) if found.of_cycles else (1, None)
         named = extremes(surrogate, len(study.inputs), runs.values.shape[1], study.seed, *how)
         if error is None:
             error = _confirmed(study, surrogate, named)
-        elif found.foretold:
+        elif found.of_cycles:
             error = _tested(study, surrogate, named, error)
         if error is not None and not runs.controls:
             error = _controlled(study, surrogate, error)
-        if found.foretold:
+        if found.of_cycles:
             _attain(study, surrogate, named)
-    values, germs = runs.values, runs.germs
-    at_lower, at_upper = germs[values.argmin(axis=0)], germs[values.argmax(axis=0)]
+    values, xi = runs.values, runs.xi
+    at_lower, at_upper = xi[values.argmin(axis=0)], xi[values.argmax(axis=0)]
     lower, upper = values.min(axis=0), values.max(axis=0)
     unknown = np.full(len(lower), np.nan)
-    told = Enclosure(lower, upper, unknown, unknown, unknown)
-    if known and found.looked is not None:
-        told = found.looked.told
+    answers = Enclosure(lower, upper, unknown, unknown, unknown)
+    if known and found.enclosed is not None:
+        answers = found.enclosed.enclosure
     elif surrogate is not None and named is not None and error is not None:
-        told = (foretold if found.foretold else enclosure)(study, surrogate, named, error)
-    end = _horizon(study, told.gap)
-    within = told.gap[study.instants <= end]
+        answers = (enclosure_of_cycles if found.of_cycles else enclosure)(study, surrogate, named, error)
+    end = _horizon(study, answers.gap)
+    within = answers.gap[study.instants <= end]
     return Bounds(
-        told.lower,
-        told.upper,
-        told.lower_outer,
-        told.upper_outer,
+        answers.lower,
+        answers.upper,
+        answers.lower_outer,
+        answers.upper_outer,
         study.inputs.named(at_lower),
         study.inputs.named(at_upper),
         float(within.max()) if within.size else math.nan,
@@ -249,11 +249,11 @@ def likely(study: Study, bounds: Bounds) -> Bounds:
     Whatever the distribution of the answers (Wilks, Determination of sample sizes for setting tolerance limits, Annals
     of Mathematical Statistics 12, 1941); the intervals are taken as evenly likely.
     """
-    runs, made, failed = study.runs, len(study.runs.germs), study.runs.failed
+    runs, made, failed = study.runs, len(study.runs.xi), study.runs.failed
     runs.all(study.inputs.drawn(WILKS, study.seed + 1))
     if runs.failed > failed:
         return bounds
-    drawn, germs = runs.values[made:], study.inputs.named(runs.germs[made:])
+    drawn, xi = runs.values[made:], study.inputs.named(runs.xi[made:])
     low, high = drawn.min(axis=0), drawn.max(axis=0)
     lower, upper = low < bounds.lower, high > bounds.upper
     return replace(
@@ -262,24 +262,24 @@ def likely(study: Study, bounds: Bounds) -> Bounds:
         upper=np.where(upper, high, bounds.upper),
         lower_outer=np.fmin(bounds.lower_outer, low),
         upper_outer=np.fmax(bounds.upper_outer, high),
-        at_lower=np.where(lower[:, None], germs[drawn.argmin(axis=0)], bounds.at_lower),
-        at_upper=np.where(upper[:, None], germs[drawn.argmax(axis=0)], bounds.at_upper),
+        at_lower=np.where(lower[:, None], xi[drawn.argmin(axis=0)], bounds.at_lower),
+        at_upper=np.where(upper[:, None], xi[drawn.argmax(axis=0)], bounds.at_upper),
         likely=np.stack([low, high]),
     )
 
 
-def _confirmed(study: Study, surrogate: Surrogate, foretold: Extremes) -> Array | None:
+def _confirmed(study: Study, surrogate: Surrogate, named: Extremes) -> Array | None:
     """The error of a surrogate at its own extremal points, which are run; None if there are no runs left for it.
 
     At least that at runs that are left out of it, where it knows that.
     """
     runs = study.runs
-    wanted: Array = np.unique(np.round(np.vstack([foretold.at_lower, foretold.at_upper]), 2), axis=0)
+    wanted: Array = np.unique(np.round(np.vstack([named.at_lower, named.at_upper]), 2), axis=0)
     wanted = wanted[: max(0, min(len(wanted), runs.left, study.fair))]
-    made = len(runs.germs)
+    made = len(runs.xi)
     if not len(wanted) or runs(wanted) == 0:
         return None
-    missed = np.abs(surrogate(runs.germs[made:]) - runs.values[made:]).max(axis=0, initial=0.0)
+    missed = np.abs(surrogate(runs.xi[made:]) - runs.values[made:]).max(axis=0, initial=0.0)
     return np.asarray(np.maximum(missed, getattr(surrogate, "left_out", 0.0)))
 
 
@@ -305,10 +305,10 @@ def _tested(study: Study, surrogate: Surrogate, named: Extremes, error: Array) -
     for place in np.concatenate([named.at_lower, named.at_upper])[np.argsort(-share)]:
         if len(places) < count and all(np.abs(place - other).max() > TEST_SPACING for other in places):
             places.append(place)
-    made = len(runs.germs)
+    made = len(runs.xi)
     if runs.left < count or runs(np.array(places)) == 0:
         return error
-    missed = np.abs(surrogate(runs.germs[made:]) - runs.values[made:]).max(axis=0)
+    missed = np.abs(surrogate(runs.xi[made:]) - runs.values[made:]).max(axis=0)
     return np.maximum(error, study.largest(missed, runs.values))
 
 
@@ -332,8 +332,8 @@ def _attain(study: Study, surrogate: Surrogate, named: Extremes) -> None:
         while left.any() and len(chosen) < min(AT_ONCE, most - made):
             place = places[np.flatnonzero(left)[left.sum() // 2]]
             chosen.append(place)
-            told = surrogate(place[None])[0]
-            left &= signs * np.tile(told, 2) > best + near
+            answers = surrogate(place[None])[0]
+            left &= signs * np.tile(answers, 2) > best + near
             left[np.all(places == place, axis=1)] = False
         runs.named += runs(np.array(chosen))
         made += len(chosen)

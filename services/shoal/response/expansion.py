@@ -27,7 +27,7 @@ SOLE = 1e-6
 
 @dataclass(frozen=True)
 class Expansion:
-    """Call it with germs, (places, parameters): the answers there, (places, columns).
+    """Call it with standardised variables, (places, parameters): the answers there, (places, columns).
 
     terms: degrees, (terms, parameters); coefficients: of the orthonormal products, (terms, columns); left_out: error at
     each run of the fit to all others, root of the mean square, (columns,); squares: the same of the squares of what
@@ -42,17 +42,17 @@ class Expansion:
     squares: Array | None = None
     whole: bool = True
 
-    def __call__(self, germs: Array) -> Array:
-        """The answers at these germs."""
-        return np.asarray(self.inputs.basis(germs, self.terms) @ self.coefficients)
+    def __call__(self, xi: Array) -> Array:
+        """The answers at these places."""
+        return np.asarray(self.inputs.basis(xi, self.terms) @ self.coefficients)
 
-    def each(self, germs: Array, columns: IntArray) -> Array:
-        """One column at each germ, (places,): as cheap as one answer instead of all."""
+    def each(self, xi: Array, columns: IntArray) -> Array:
+        """One column at each place, (places,): as cheap as one answer instead of all."""
         # Where nobody searches, the compiler is not loaded.
         from shoal.response.one_column import one_column
 
         highest, terms, coefficients = self._laid
-        return np.asarray(one_column(self.inputs.table(germs, highest), terms, coefficients, columns))
+        return np.asarray(one_column(self.inputs.table(xi, highest), terms, coefficients, columns))
 
     @cached_property
     def _laid(self) -> tuple[IntArray, Terms, Array]:
@@ -86,12 +86,12 @@ class Expansion:
         return np.asarray((self.coefficients[1:] ** 2).sum(axis=0))
 
 
-def fit(inputs: Inputs, germs: Array, values: Array, terms: Terms) -> Expansion:
+def fit(inputs: Inputs, xi: Array, values: Array, terms: Terms) -> Expansion:
     """The expansion nearest to these runs in the sense of least squares."""
-    basis = inputs.basis(germs, terms)
+    basis = inputs.basis(xi, terms)
     q, r = np.linalg.qr(basis)
     diagonal = np.abs(np.diag(r))
-    whole = bool(len(germs) >= len(terms) and diagonal.min() > RANK * diagonal.max())
+    whole = bool(len(xi) >= len(terms) and diagonal.min() > RANK * diagonal.max())
     coefficients = solve_triangular(r, q.T @ values) if whole else np.linalg.lstsq(basis, values, rcond=RANK)[0]
     # A run that decides about a term by itself has all of the influence on its own misfit.
     influence = (q**2).sum(axis=1, keepdims=True)
@@ -113,7 +113,7 @@ WORSE = 2
 """Degrees in a row that no column gains by, after which no higher one is tried."""
 
 
-def choose_degree(study: Study, share: float, judged: Callable[[Expansion], Expansion]) -> Expansion:
+def choose_degree(study: Study, share: float, assess: Callable[[Expansion], Expansion]) -> Expansion:
     """Of `degree`, or of each column's own among those that the runs carry: so many for every term, at least.
 
     judged: an expansion with what else is known of its error
@@ -123,10 +123,10 @@ def choose_degree(study: Study, share: float, judged: Callable[[Expansion], Expa
     known: Expansion | None = None
     worse = 0
     for degree in [study.degree] if study.degree else range(1, HIGHEST_TRIED + 1):
-        if known is not None and share * size(parameters, degree) > len(runs.germs):
+        if known is not None and share * size(parameters, degree) > len(runs.xi):
             break
         terms = total_degree(parameters, degree)
-        found = judged(fit(study.inputs, runs.germs, runs.values, terms[(terms <= highest).all(axis=1)]))
+        found = assess(fit(study.inputs, runs.xi, runs.values, terms[(terms <= highest).all(axis=1)]))
         if known is None:
             known = found
             continue
@@ -147,22 +147,22 @@ MISSED = 0.05
 """Share of a deviation that so few places may miss."""
 
 
-def outermost(inputs: Inputs, germs: Array) -> BoolArray:
-    """Which runs are, (runs,); none where all germs are bounded, or where all are as far out."""
-    far = np.abs(germs[:, inputs.unbounded]).max(axis=1, initial=0.0)
+def outermost(inputs: Inputs, xi: Array) -> BoolArray:
+    """Which runs are, (runs,); none where all standardised variables are bounded, or where all are as far out."""
+    far = np.abs(xi[:, inputs.unbounded]).max(axis=1, initial=0.0)
     outer = np.asarray(far >= np.sort(far)[-max(1, int(OUTER * len(far)))])
     return outer & inputs.unbounded.any() & ~outer.all()
 
 
-def outwards(germs: Array, values: Array, found: Expansion) -> Expansion:
+def outwards(xi: Array, values: Array, found: Expansion) -> Expansion:
     """With the error of the outermost runs where its terms are fitted to all others."""
-    outer = outermost(found.inputs, germs)
+    outer = outermost(found.inputs, xi)
     if not outer.any():
         return found
-    basis = found.inputs.basis(germs, found.terms)
-    told = np.linalg.lstsq(basis[~outer], values[~outer], rcond=None)[0]
-    missed = basis[outer] @ told - values[outer]
-    beyond = np.sqrt((missed**2).sum(axis=0) / len(germs))
+    basis = found.inputs.basis(xi, found.terms)
+    coefficients_inside = np.linalg.lstsq(basis[~outer], values[~outer], rcond=None)[0]
+    missed = basis[outer] @ coefficients_inside - values[outer]
+    beyond = np.sqrt((missed**2).sum(axis=0) / len(xi))
     return replace(found, left_out=np.maximum(found.left_out, beyond))
 
 

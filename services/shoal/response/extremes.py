@@ -25,7 +25,7 @@ from shoal.response.inputs import IntArray
 from shoal.trajectory import Array
 
 DIFFERENCE = 1e-6
-"""Of germs, for slopes."""
+"""Of standardised variables, for slopes."""
 FIRST_LENGTH = 0.1
 """Length of the first step."""
 DESCENTS = 30
@@ -85,8 +85,8 @@ def _slopes(objective: Objective, at: Array, value: Array, searches: IntArray) -
     ways = np.stack([one, other])
     # All places that are needed, (ways, axes, searches, parameters), at one go.
     beside = at + ways.transpose(0, 2, 1)[..., None] * np.eye(parameters)[:, None]
-    told = objective(beside.reshape(-1, parameters), np.tile(searches, 2 * parameters))
-    chords = (told.reshape(2, parameters, len(at)).transpose(0, 2, 1) - value[:, None]) / ways
+    answers = objective(beside.reshape(-1, parameters), np.tile(searches, 2 * parameters))
+    chords = (answers.reshape(2, parameters, len(at)).transpose(0, 2, 1) - value[:, None]) / ways
     found = (chords[0] * other - chords[1] * one) / (other - one)
     return found, 2 * (chords[1] - chords[0]) / (other - one)
 
@@ -222,25 +222,25 @@ STEPS = 0.25, 0.1
 
 
 class Each(Protocol):
-    """One column at any germ without a run."""
+    """One column at any place without a run."""
 
-    def each(self, germs: Array, columns: IntArray) -> Array:
+    def each(self, xi: Array, columns: IntArray) -> Array:
         """(places,)."""
         ...
 
 
 class Surrogate(Each, Protocol):
-    """Answers at any germ without a run."""
+    """Answers at any place without a run."""
 
-    def __call__(self, germs: Array) -> Array:
+    def __call__(self, xi: Array) -> Array:
         """(places, columns)."""
         ...
 
 
 @dataclass(frozen=True)
 class Extremes:
-    """lower, upper: (columns,); at_lower, at_upper: the germs there, (columns, parameters); doubt: what one of the
-    last rounds of searches still gained, (columns,)
+    """lower, upper: (columns,); at_lower, at_upper: the standardised variables there, (columns, parameters); doubt:
+    what one of the last rounds of searches still gained, (columns,)
     """
 
     lower: Array
@@ -280,8 +280,8 @@ def extremes(
         return Extremes(best[0], -best[1], at[0], at[1], np.zeros(columns))
     for further in range(1, ROUNDS):
         # The place of an extreme at one instant is often near that of another.
-        looked_at = np.concatenate([places(parameters, (seed, further)), np.unique(at.reshape(-1, parameters), axis=0)])
-        also, there = _round(surrogate, _apart(looked_at, starts), columns)
+        scanned = np.concatenate([places(parameters, (seed, further)), np.unique(at.reshape(-1, parameters), axis=0)])
+        also, there = _round(surrogate, _apart(scanned, starts), columns)
         _search_sides(surrogate, also, there)
         gained = np.vstack([gained, np.maximum(best - also, 0.0).max(axis=0)])[-IDLE:]
         best, at = np.minimum(best, also), np.where((also < best)[:, :, None], there, at)
@@ -290,9 +290,9 @@ def extremes(
     return Extremes(best[0], -best[1], at[0], at[1], gained.max(axis=0, initial=0.0))
 
 
-def _apart(looked_at: Array, starts: int) -> list[Array]:
+def _apart(scanned: Array, starts: int) -> list[Array]:
     """As many parts: every n-th place of Sobol's sequence lies in one of its own, where n is a power of two."""
-    return [looked_at[start::starts] for start in range(starts)]
+    return [scanned[start::starts] for start in range(starts)]
 
 
 def _round(surrogate: Surrogate, sets: Sequence[Array], columns: int) -> tuple[Array, Array]:
@@ -305,8 +305,8 @@ def _round(surrogate: Surrogate, sets: Sequence[Array], columns: int) -> tuple[A
     at = np.zeros((starts, 2, columns, parameters))
     every = np.arange(columns)
     for start, mine in enumerate(sets):
-        for some, told in in_parts(surrogate, mine, columns):
-            found = np.ascontiguousarray(told.T)
+        for some, answers in in_parts(surrogate, mine, columns):
+            found = np.ascontiguousarray(answers.T)
             for side, (sign, least) in enumerate(((1.0, found.argmin(axis=1)), (-1.0, found.argmax(axis=1)))):
                 value = sign * found[every, least]
                 better = value < best[start, side]
@@ -323,13 +323,13 @@ def _round(surrogate: Surrogate, sets: Sequence[Array], columns: int) -> tuple[A
     return np.take_along_axis(best, first, 0)[0], np.take_along_axis(at, first[..., None], 0)[0]
 
 
-def in_parts(surrogate: Surrogate, looked_at: Array, columns: int) -> Iterator[tuple[slice, Array]]:
+def in_parts(surrogate: Surrogate, scanned: Array, columns: int) -> Iterator[tuple[slice, Array]]:
     """What a surrogate says at some of the places, (places, columns): so many at once as a processor has at hand."""
     whole, part = (max(1, numbers // max(columns, 1)) for numbers in (HELD, AT_HAND))
-    for k in range(0, len(looked_at), whole):
-        told = surrogate(looked_at[k : k + whole])
-        for j in range(0, len(told), part):
-            yield slice(k + j, k + min(j + part, len(told))), told[j : j + part]
+    for k in range(0, len(scanned), whole):
+        answers = surrogate(scanned[k : k + whole])
+        for j in range(0, len(answers), part):
+            yield slice(k + j, k + min(j + part, len(answers))), answers[j : j + part]
 
 
 def _search_sides(surrogate: Surrogate, best: Array, at: Array) -> None:
@@ -355,12 +355,12 @@ def along(
     """Improve all columns along one axis: at both sides and where the parabola through the three is least."""
     here, sides = best.copy(), np.stack([at, at])
     sides[:, :, axis] = np.clip(at[:, axis] + np.array([[-step], [step]]), -1, 1)
-    told = sign * _each(surrogate, np.concatenate(sides), np.tile(every, 2)).reshape(2, -1)
-    curved = told[0] - 2 * here + told[1]
-    shift = np.divide(told[0] - told[1], 2 * curved, out=np.zeros_like(here), where=curved > 0)
+    answers = sign * _each(surrogate, np.concatenate(sides), np.tile(every, 2)).reshape(2, -1)
+    curved = answers[0] - 2 * here + answers[1]
+    shift = np.divide(answers[0] - answers[1], 2 * curved, out=np.zeros_like(here), where=curved > 0)
     lowest = at.copy()
     lowest[:, axis] = np.clip(lowest[:, axis] + step * np.clip(shift, -2, 2), -1, 1)
-    tried = [(sides[0], told[0]), (sides[1], told[1]), (lowest, sign * _each(surrogate, lowest, every))]
+    tried = [(sides[0], answers[0]), (sides[1], answers[1]), (lowest, sign * _each(surrogate, lowest, every))]
     for place, value in tried:
         better = value < best
         best[better], at[better] = value[better], place[better]

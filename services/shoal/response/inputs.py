@@ -1,4 +1,4 @@
-"""The uncertain parameters together: from germs to values."""
+"""The uncertain parameters together: from standardised variables to values."""
 
 from __future__ import annotations
 
@@ -139,31 +139,31 @@ class Inputs:
         return found
 
     def _standard(self, k: int) -> bool:
-        """Return whether the germ of a parameter is a standard normal variable whatever its distribution."""
+        """Return whether xi of a parameter is a standard normal variable whatever its distribution."""
         return k in self._correlated
 
     @property
     def unbounded(self) -> BoolArray:
-        """Which germs are normal variables, (parameters,)."""
+        """Which standardised variables are normal variables, (parameters,)."""
         return np.array([self.recurrence(k) is HERMITE for k in range(len(self))], dtype=bool)
 
     def recurrence(self, k: int) -> Recurrence:
-        """Of the polynomials that are orthonormal under the measure of one parameter's germ."""
+        """Of the polynomials that are orthonormal under the measure of one parameter's standardised variable."""
         return HERMITE if self._standard(k) else self.parameters[k].marginal.basis
 
-    def values(self, germs: Array) -> dict[str, Array]:
-        """Path -> value of every run; germs: (runs, parameters)."""
-        return self._given(self._numbers(germs))
+    def values(self, xi: Array) -> dict[str, Array]:
+        """Path -> value of every run; xi: (runs, parameters)."""
+        return self._given(self._numbers(xi))
 
-    def _numbers(self, germs: Array) -> Array:
+    def _numbers(self, xi: Array) -> Array:
         """Values of the parameters, both (runs, parameters)."""
         found = []
-        correlated = germs[:, self._correlated] @ self._factor.T if self._correlated else None
+        correlated = xi[:, self._correlated] @ self._factor.T if self._correlated else None
         for k, one in enumerate(self.parameters):
-            s = germs[:, k]
+            s = xi[:, k]
             if correlated is not None and self._standard(k):
                 z = correlated[:, self._correlated.index(k)]
-                s = z if isinstance(one.marginal, Normal) else one.marginal.germ(special.ndtr(z))
+                s = z if isinstance(one.marginal, Normal) else one.marginal.quantile(special.ndtr(z))
             found.append(one.marginal.value(s))
         return np.stack(found, axis=1)
 
@@ -174,8 +174,8 @@ class Inputs:
         for joint in self.joints:
             known = {word: numbers[:, self.names.index(name)] for word, name in joint.known.items()}
             for path, text in joint.ties.items():
-                told = expression.evaluate_array(text, {**joint.constants, **known})
-                given[path] = np.broadcast_to(told, len(numbers)).astype(float)
+                values_of = expression.evaluate_array(text, {**joint.constants, **known})
+                given[path] = np.broadcast_to(values_of, len(numbers)).astype(float)
         return given
 
     @property
@@ -183,18 +183,18 @@ class Inputs:
         """What users state of a parameter over its value, (parameters,)."""
         return np.array([next(iter(one.factors.values()), 1.0) for one in self.parameters])
 
-    def named(self, germs: Array) -> Array:
+    def named(self, xi: Array) -> Array:
         """Values of the parameters as the user states them, (runs, parameters)."""
-        return np.asarray(self._numbers(np.atleast_2d(germs)) * self._first)
+        return np.asarray(self._numbers(np.atleast_2d(xi)) * self._first)
 
     def at(self, named: Array) -> dict[str, float]:
         """Path -> value where the parameters have these values, (parameters,), as the user states them."""
         return {path: float(at[0]) for path, at in self._given((named / self._first)[None]).items()}
 
-    def germs(self, x: Array) -> Array:
+    def quantiles(self, x: Array) -> Array:
         """Germs at independent probabilities, both (runs, parameters)."""
         found = [
-            special.ndtri(x[:, k]) if self._standard(k) else one.marginal.germ(x[:, k])
+            special.ndtri(x[:, k]) if self._standard(k) else one.marginal.quantile(x[:, k])
             for k, one in enumerate(self.parameters)
         ]
         return np.stack(found, axis=1)
@@ -204,51 +204,51 @@ class Inputs:
         found = [
             places[:, k]
             if self._standard(k) or isinstance(one.marginal, Normal)
-            else one.marginal.germ(inside(special.ndtr(places[:, k])))
+            else one.marginal.quantile(inside(special.ndtr(places[:, k])))
             for k, one in enumerate(self.parameters)
         ]
         return np.stack(found, axis=1)
 
     def sobol(self, count: int, seed: int, skip: int = 0) -> Array:
-        """Quasi-random germs: Sobol's sequence, scrambled (Owen), after the first `skip`."""
+        """Quasi-random xi: Sobol's sequence, scrambled (Owen), after the first `skip`."""
         power = max(int(np.ceil(np.log2(max(skip + count, 1)))), 0)
-        return self.germs(inside(qmc.Sobol(len(self), rng=seed).random_base2(power)[skip : skip + count]))
+        return self.quantiles(inside(qmc.Sobol(len(self), rng=seed).random_base2(power)[skip : skip + count]))
 
     def drawn(self, count: int, seed: int) -> Array:
-        """Random germs."""
-        return self.germs(inside(np.random.default_rng(seed).random((count, len(self)))))
+        """Random standardised variables."""
+        return self.quantiles(inside(np.random.default_rng(seed).random((count, len(self)))))
 
     def highest(self, degree: int) -> tuple[int, ...]:
         """The highest degree of each parameter's polynomials up to this one: few observations carry few."""
         return tuple(min(degree, len(self.recurrence(k).a), len(self.recurrence(k).b) - 1) for k in range(len(self)))
 
-    def polynomials(self, k: int, germs: Array, degree: int) -> Array:
-        """Those of one parameter at its germs, (runs,), from degree 0, (runs, degree + 1)."""
-        return self.recurrence(k)(germs, degree)
+    def polynomials(self, k: int, xi: Array, degree: int) -> Array:
+        """Those of one parameter at its standardised variables, (runs,), from degree 0, (runs, degree + 1)."""
+        return self.recurrence(k)(xi, degree)
 
-    def basis(self, germs: Array, terms: Terms) -> Array:
-        """Every product of polynomials at every germ, (runs, terms)."""
+    def basis(self, xi: Array, terms: Terms) -> Array:
+        """Every product of polynomials at every place, (runs, terms)."""
         highest = terms.max(axis=0)
-        told, found = self.table(germs, highest), np.ones((len(terms), len(germs)))
+        values_of, found = self.table(xi, highest), np.ones((len(terms), len(xi)))
         # Terms are rows, which is faster.
         for k in np.flatnonzero(highest).tolist():
-            found *= told[terms[:, k], k]
+            found *= values_of[terms[:, k], k]
         return np.ascontiguousarray(found.T)
 
-    def table(self, germs: Array, highest: IntArray) -> Array:
+    def table(self, xi: Array, highest: IntArray) -> Array:
         """Polynomials of each parameter up to its highest degree at least, (degrees, parameters, runs).
 
         Parameters with the same polynomials are evaluated together.
         """
         rows = [
-            (which, recurrence.rows(np.ascontiguousarray(germs[:, which].T), int(highest[which].max())))
+            (which, recurrence.rows(np.ascontiguousarray(xi[:, which].T), int(highest[which].max())))
             for recurrence, which in self._alike
         ]
         if len(rows) == 1:
             return rows[0][1]
-        found = np.ones((int(highest.max()) + 1, len(self), len(germs)))
-        for which, told in rows:
-            found[: len(told), which] = told
+        found = np.ones((int(highest.max()) + 1, len(self), len(xi)))
+        for which, values_of in rows:
+            found[: len(values_of), which] = values_of
         return found
 
     @cached_property

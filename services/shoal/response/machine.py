@@ -46,7 +46,7 @@ class ResponseModel:
     scene: Scene
     times: Array
     engine: Engine
-    told: Callable[[Trajectory, Scene, Mapping[str, Array]], Array] = field(default_factory=lambda: _columns)
+    reduce: Callable[[Trajectory, Scene, Mapping[str, Array]], Array] = field(default_factory=lambda: _columns)
     keep: Keep | None = None
     fixed: str = ""
     starts: Tally | None = None
@@ -83,7 +83,7 @@ class ResponseModel:
         if self.keep is None:
             found = self._some(values)
         else:
-            label, stated = repr(getattr(self.told, "__self__", "markers")) + self.fixed, 0
+            label, stated = repr(getattr(self.reduce, "__self__", "markers")) + self.fixed, 0
             if self.starts is not None and (stated := len(self.starts.stated.values)):
                 label += repr(self.starts.stated.values)
             found = self.keep(label, values, self._some, stated)
@@ -168,9 +168,9 @@ class ResponseModel:
     def _lanes(
         self, motion: Trajectory, scene: Scene, values: Mapping[str, Array], lanes: IntArray
     ) -> dict[int, _Lane]:
-        told, good = self.told(motion, scene, values), _good(motion)
+        reduce, good = self.reduce(motion, scene, values), _good(motion)
         away = np.zeros((len(lanes), 0)) if self.starts is None else self.starts.of(motion)
-        each = zip(lanes.tolist(), told, good.tolist(), away, strict=True)
+        each = zip(lanes.tolist(), reduce, good.tolist(), away, strict=True)
         return {lane: _Lane(row, well, off) for lane, row, well, off in each}
 
 

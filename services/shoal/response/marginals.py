@@ -1,8 +1,8 @@
 """What is known about one parameter: an interval, or a distribution.
 
-Methods work in the germ s of a parameter: its place in [-1, 1] for intervals and uniform distributions, the standard
-normal variable for normal and lognormal ones, the standardised value for others (arbitrary polynomial chaos: Oladyshkin
-and Nowak, Reliability Engineering and System Safety 106, 2012).
+Methods work in the standardised variable s of a parameter: its place in [-1, 1] for intervals and uniform
+distributions, the standard normal variable for normal and lognormal ones, the standardised value for others (arbitrary
+polynomial chaos: Oladyshkin and Nowak, Reliability Engineering and System Safety 106, 2012).
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class Marginal(Protocol):
 
     @property
     def basis(self) -> Recurrence:
-        """Polynomials in the germ that are orthonormal under its measure."""
+        """Polynomials in the standardised variable that are orthonormal under its measure."""
         ...
 
     @property
@@ -45,12 +45,12 @@ class Marginal(Protocol):
         """Half the width of an interval, the standard deviation of a distribution."""
         ...
 
-    def germ(self, x: Array) -> Array:
-        """The germ at probabilities x in (0, 1)."""
+    def quantile(self, x: Array) -> Array:
+        """The standardised variable at probabilities x in (0, 1)."""
         ...
 
     def value(self, s: Array) -> Array:
-        """The parameter at germs s."""
+        """The parameter at standardised variables s."""
         ...
 
 
@@ -69,7 +69,7 @@ class Interval:
         """Half the width."""
         return 0.5 * (self.high - self.low)
 
-    def germ(self, x: Array) -> Array:
+    def quantile(self, x: Array) -> Array:
         """Evenly over [-1, 1]."""
         return np.asarray(2 * x - 1)
 
@@ -109,7 +109,7 @@ class Normal:
             return self.deviation
         return math.exp(self.mean + 0.5 * self.deviation**2) * math.sqrt(math.expm1(self.deviation**2))
 
-    def germ(self, x: Array) -> Array:
+    def quantile(self, x: Array) -> Array:
         """The standard normal variable."""
         return np.asarray(special.ndtri(x))
 
@@ -145,9 +145,9 @@ class Frozen:
         edges = 0.5 * (1 + np.sin(0.5 * np.pi * np.linspace(-1, 1, parts + 1)))
         half, middle = 0.5 * np.diff(edges), 0.5 * (edges[1:] + edges[:-1])
         x = (middle[:, None] + half[:, None] * nodes).ravel()
-        return of_measure(self.germ(x), (half[:, None] * weights).ravel())
+        return of_measure(self.quantile(x), (half[:, None] * weights).ravel())
 
-    def germ(self, x: Array) -> Array:
+    def quantile(self, x: Array) -> Array:
         """The standardised value."""
         mean, deviation = self._scale
         return np.asarray((self.distribution.ppf(x) - mean) / deviation)
@@ -181,7 +181,7 @@ class Empirical:
         mean, deviation = self._scale
         return of_measure((self.data - mean) / deviation, np.full(len(self.data), 1 / len(self.data)))
 
-    def germ(self, x: Array) -> Array:
+    def quantile(self, x: Array) -> Array:
         """The standardised observation."""
         mean, deviation = self._scale
         ranks = np.minimum((np.asarray(x) * len(self.data)).astype(int), len(self.data) - 1)
@@ -216,13 +216,13 @@ class Scaled:
         """The standard deviation."""
         return self.factor * self.marginal.tolerance
 
-    def germ(self, x: Array) -> Array:
+    def quantile(self, x: Array) -> Array:
         """That of the distribution."""
-        return self.marginal.germ(x)
+        return self.marginal.quantile(x)
 
     def value(self, s: Array) -> Array:
         """The value."""
-        median = self.marginal.value(self.marginal.germ(np.array([0.5])))
+        median = self.marginal.value(self.marginal.quantile(np.array([0.5])))
         return np.asarray(median + self.factor * (self.marginal.value(s) - median))
 
 

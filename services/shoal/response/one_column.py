@@ -11,7 +11,7 @@ from shoal.trajectory import Array
 
 
 @njit(cache=True, error_model="numpy")
-def one_column(told: Array, terms: Terms, coefficients: Array, columns: IntArray) -> Array:
+def one_column(basis: Array, terms: Terms, coefficients: Array, columns: IntArray) -> Array:
     """Of the columns asked for, (places,).
 
     told: polynomials, (degrees, parameters, places); terms: degrees, (terms, parameters); coefficients: (terms,
@@ -26,7 +26,7 @@ def one_column(told: Array, terms: Terms, coefficients: Array, columns: IntArray
             degree = terms[t, k]
             if degree:
                 for i in range(places):
-                    product[i] *= told[degree, k, i]
+                    product[i] *= basis[degree, k, i]
         for i in range(places):
             found[i] += product[i]
     return found

@@ -42,22 +42,22 @@ def is_source(given: str) -> bool:
 def from_posterior(file: str, scene: Scene) -> list[UncertainParameter]:
     """The parameters of the machine, named by their paths. Raises InputError."""
     path = Path(file)
-    told, left, draws = _draws(path) if path.suffix == ".nc" else (*_estimate(path), None)
-    known: dict[str, dict[str, Any]] = told["parameters"]
+    joint_data, left, draws = _draws(path) if path.suffix == ".nc" else (*_estimate(path), None)
+    known: dict[str, dict[str, Any]] = joint_data["parameters"]
     if not known:
         raise InputError(f"vary: {file}: nothing of it is of the machine, only {', '.join(left) or 'nothing at all'}")
     if listed := ", ".join(name for name, one in known.items() if not one["known"]):
         raise InputError(f"vary: {file}: {listed} is not known from what was measured; fix it and identify anew")
     names = {name: one["path"] or name for name, one in known.items()}
     if draws is None:
-        marginals, matrix = _normal(told, path.name)
+        marginals, matrix = _normal(joint_data, path.name)
     else:
         marginals, matrix = _drawn([draws[name] for name in known], path.name)
     pairs = {
         (names[one], names[other]): float(np.clip(matrix[i, j], -ALIKE, ALIKE))
         for (i, one), (j, other) in combinations(enumerate(known), 2)
     }
-    joint = Joint(path.name, pairs, told["ties"], names, told["constants"], left)
+    joint = Joint(path.name, pairs, joint_data["ties"], names, joint_data["constants"], left)
     found = [
         UncertainParameter(names[name], marginal, {one["path"]: 1.0} if one["path"] else {}, joint)
         for (name, one), marginal in zip(known.items(), marginals, strict=True)
@@ -85,8 +85,8 @@ def _draws(path: Path) -> tuple[dict[str, Any], dict[str, str], dict[str, Array]
     try:
         with xr.open_dataset(path, engine="scipy") as data:
             about = dict(data.attrs)
-            told, left = json.loads(about["joint"]), json.loads(about["left_out"])
-            draws = {name: np.asarray(data[name].values, dtype=float).ravel() for name in told["parameters"]}
+            joint_data, left = json.loads(about["joint"]), json.loads(about["left_out"])
+            draws = {name: np.asarray(data[name].values, dtype=float).ravel() for name in joint_data["parameters"]}
     except OSError as error:
         raise InputError(f"vary: {path} cannot be read: {error.strerror or error}") from None
     except (ValueError, KeyError, TypeError):
@@ -99,11 +99,11 @@ def _draws(path: Path) -> tuple[dict[str, Any], dict[str, str], dict[str, Array]
     if draws and count < LEAST:
         raise InputError(f"vary: {path}: needs at least {LEAST} draws, found {count}")
     step = -(-count // DRAWS)
-    return checked_joint(told, "vary", path), left, {name: of[::step] for name, of in draws.items()}
+    return checked_joint(joint_data, "vary", path), left, {name: of[::step] for name, of in draws.items()}
 
 
-def _normal(told: Mapping[str, Any], source: str) -> tuple[list[Marginal], Array]:
-    known, covariance = list(told["parameters"].values()), told["covariance"]
+def _normal(joint_data: Mapping[str, Any], source: str) -> tuple[list[Marginal], Array]:
+    known, covariance = list(joint_data["parameters"].values()), joint_data["covariance"]
     middle = np.array([one["value"] for one in known])
     logarithmic = np.array([one["logarithmic"] for one in known])
     # d log(x) = dx / x, as the covariance of the values was made from that of the logarithms.
@@ -111,7 +111,7 @@ def _normal(told: Mapping[str, Any], source: str) -> tuple[list[Marginal], Array
     spread = slope[:, None] * covariance * slope
     deviation = np.sqrt(np.maximum(np.diag(spread), 0.0))
     if not np.all(deviation > 0):
-        name = list(told["parameters"])[int(np.argmin(deviation))]
+        name = list(joint_data["parameters"])[int(np.argmin(deviation))]
         raise InputError(f"vary: {source}: {name} has no spread")
     marginals: list[Marginal] = []
     for one, at, off in zip(known, middle.tolist(), deviation.tolist(), strict=True):
@@ -152,7 +152,7 @@ class _Draws:
 
 def _accepted(found: list[UncertainParameter], scene: Scene, file: str) -> None:
     """Raises InputError where the scene has no such field, or refuses a value that is likely."""
-    ends = [one.marginal.value(one.marginal.germ(special.ndtr(np.array([-FAR, FAR])))) for one in found]
+    ends = [one.marginal.value(one.marginal.quantile(special.ndtr(np.array([-FAR, FAR])))) for one in found]
     for one, (low, high) in zip(found, ends, strict=True):
         for path in one.factors:
             for value in (low, high):

@@ -32,7 +32,7 @@ BLOCK = 4_000_000
 
 @dataclass(frozen=True)
 class Conditional:
-    """An expansion whose interval germs are given, (places, intervals)."""
+    """An expansion whose interval variables are given, (places, intervals)."""
 
     expansion: Expansion
 
@@ -48,8 +48,8 @@ class Conditional:
 
     @cached_property
     def _sorted(self) -> tuple[Terms, Terms, Array, IntArray]:
-        """Terms in the random germs, each once, the constant first; those in the intervals, and the coefficients, in
-        their order; where each begins.
+        """Terms in the random variables, each once, the constant first; those in the intervals, and the
+        coefficients, in their order; where each begins.
         """
         random = self.expansion.inputs.random
         different, which = np.unique(self.expansion.terms[:, random], axis=0, return_inverse=True)
@@ -60,7 +60,7 @@ class Conditional:
 
     @property
     def terms(self) -> Terms:
-        """Degrees of the polynomials of the random germs, the constant first, (terms, random parameters)."""
+        """Degrees of the polynomials of the random variables, the constant first, (terms, random parameters)."""
         return self._sorted[0]
 
     def parts(self, given: Array) -> list[Array]:
@@ -79,17 +79,17 @@ class Conditional:
 
 @dataclass(frozen=True)
 class Mean:
-    """The mean at interval germs."""
+    """The mean at interval variables."""
 
     of: Conditional
 
-    def __call__(self, germs: Array) -> Array:
+    def __call__(self, xi: Array) -> Array:
         """(places, columns)."""
-        return self.of.parts(germs)[0]
+        return self.of.parts(xi)[0]
 
-    def each(self, germs: Array, columns: IntArray) -> Array:
+    def each(self, xi: Array, columns: IntArray) -> Array:
         """(places,)."""
-        return np.asarray(self.of.each(germs, columns)[:, 0])
+        return np.asarray(self.of.each(xi, columns)[:, 0])
 
 
 @dataclass(frozen=True)
@@ -100,23 +100,23 @@ class Above:
     deviations: float = 1.0
     mean: float = 0.0
 
-    def __call__(self, germs: Array) -> Array:
+    def __call__(self, xi: Array) -> Array:
         """(places, columns)."""
-        first, *others = self.of.parts(germs)
+        first, *others = self.of.parts(xi)
         square = np.zeros_like(first)
         for part in others:
             square += part**2
         return np.asarray(self.mean * first + self.deviations * np.sqrt(square))
 
-    def each(self, germs: Array, columns: IntArray) -> Array:
+    def each(self, xi: Array, columns: IntArray) -> Array:
         """(places,)."""
-        found = self.of.each(germs, columns)
+        found = self.of.each(xi, columns)
         return np.asarray(self.mean * found[:, 0] + self.deviations * np.sqrt((found[:, 1:] ** 2).sum(axis=1)))
 
 
 @dataclass(frozen=True)
 class Share:
-    """Share that some terms have of the variance of the random parameters at interval germs: a Sobol index.
+    """Share that some terms have of the variance of the random parameters at interval xi: a Sobol index.
 
     counted: the terms, without the constant, (terms - 1,); nothing: a variance beside which there is none to share,
     (columns,); other: the share that is told where that is so, (columns,)
@@ -127,14 +127,14 @@ class Share:
     nothing: Array
     other: Array
 
-    def __call__(self, germs: Array) -> Array:
+    def __call__(self, xi: Array) -> Array:
         """(places, columns)."""
-        squares = np.array([part**2 for part in self.of.parts(germs)[1:]])
+        squares = np.array([part**2 for part in self.of.parts(xi)[1:]])
         return self._share(squares[self.counted].sum(axis=0), squares.sum(axis=0), slice(None))
 
-    def each(self, germs: Array, columns: IntArray) -> Array:
+    def each(self, xi: Array, columns: IntArray) -> Array:
         """(places,)."""
-        squares = self.of.each(germs, columns)[:, 1:] ** 2
+        squares = self.of.each(xi, columns)[:, 1:] ** 2
         return self._share(squares[:, self.counted].sum(axis=1), squares.sum(axis=1), columns)
 
     def _share(self, part: Array, whole: Array, columns: IntArray | slice) -> Array:
@@ -144,15 +144,15 @@ class Share:
 
 @dataclass(frozen=True)
 class Quantile:
-    """A quantile at interval germs, from the same random germs everywhere; drawn: basis there, (draws, terms)."""
+    """A quantile at given intervals, from the same random variables everywhere; drawn: basis there, (draws, terms)."""
 
     of: Conditional
     share: float
     drawn: Array
 
-    def each(self, germs: Array, columns: IntArray) -> Array:
+    def each(self, xi: Array, columns: IntArray) -> Array:
         """(places,)."""
-        found = self.of.each(germs, columns)
+        found = self.of.each(xi, columns)
         block = max(1, BLOCK // len(self.drawn))
         parts = [
             np.quantile(self.drawn @ found[k : k + block].T, self.share, axis=0) for k in range(0, len(found), block)
@@ -243,7 +243,7 @@ def boxes_of(study: Study, found: Found) -> ProbabilityBoxes:
     sides[1] = replace(sides[1], lower=np.maximum(sides[1].lower, 0.0))
     mean, std = (_ends(of.intervals, one, error) for one in sides)
     std = replace(std, lower_outer=np.maximum(std.lower_outer, 0.0))
-    told = _quantiles(of, sides, error, study.seed)
+    ends_of = _quantiles(of, sides, error, study.seed)
     scale = scatter(study, *sides)
     gap = np.divide(error, scale, out=np.zeros_like(error), where=scale > 0)
     first = study.instants[gap > max(study.gap or 0.0, BEYOND_HOPE)].min(initial=math.inf)
@@ -254,7 +254,7 @@ def boxes_of(study: Study, found: Found) -> ProbabilityBoxes:
     shares[..., study.instants > end] = np.nan
     apart = std_gap(study, std, end)
     return ProbabilityBoxes(
-        tuple(of.intervals.names), mean, std, tuple(told), largest, end, shares=shares, std_gap=apart
+        tuple(of.intervals.names), mean, std, tuple(ends_of), largest, end, shares=shares, std_gap=apart
     )
 
 
@@ -334,7 +334,7 @@ def _quantiles(of: Conditional, sides: list[Extremes], error: Array, seed: int) 
         parts = np.concatenate(of.parts(place[None]))
         found = [np.quantile(few @ parts[:, k : k + block], QUANTILES, axis=0) for k in range(0, count, block)]
         _improve(best, at, np.concatenate(found, axis=1)[:, None] * signs, np.broadcast_to(place, at.shape))
-    told = []
+    ends_of = []
     for k, share in enumerate(QUANTILES):
         one = Quantile(of, share, few)
         for side in sides:
@@ -350,8 +350,8 @@ def _quantiles(of: Conditional, sides: list[Extremes], error: Array, seed: int) 
         swapped = low > high
         low, high = np.where(swapped, high, low), np.where(swapped, low, high)
         ends = np.where(swapped[:, None], at[k][::-1], at[k])
-        told.append(_ends(intervals, Extremes(low, high, ends[0], ends[1], np.zeros(len(low))), off))
-    return told
+        ends_of.append(_ends(intervals, Extremes(low, high, ends[0], ends[1], np.zeros(len(low))), off))
+    return ends_of
 
 
 def _looked_at(parameters: int, seed: int) -> Array:
@@ -387,20 +387,20 @@ def sampled(study: Study, boxes: ProbabilityBoxes) -> ProbabilityBoxes:
     inner = min(RUNS_EACH, runs.left // len(given))
     if inner < RUNS_EACH // 2:
         return boxes
-    drawn, made, failed = random.sobol(inner, study.seed + 3), len(runs.germs), runs.failed
-    germs = np.empty((len(given) * inner, len(inputs)))
-    germs[:, ~inputs.random] = np.repeat(given, inner, axis=0)
-    germs[:, inputs.random] = np.tile(drawn, (len(given), 1))
-    runs.all(germs)
+    drawn, made, failed = random.sobol(inner, study.seed + 3), len(runs.xi), runs.failed
+    xi = np.empty((len(given) * inner, len(inputs)))
+    xi[:, ~inputs.random] = np.repeat(given, inner, axis=0)
+    xi[:, inputs.random] = np.tile(drawn, (len(given), 1))
+    runs.all(xi)
     if runs.failed > failed:
         return boxes
     values = runs.values[made:].reshape(len(given), inner, -1)
     named, late = intervals.named(given), study.instants > boxes.horizon
 
-    def instead(known: Ends, told: Array) -> Ends:
+    def instead(known: Ends, ends_of: Array) -> Ends:
         """told: (places, columns)."""
-        low, high, nothing = told.argmin(axis=0), told.argmax(axis=0), np.full(told.shape[1], np.nan)
-        new = Ends(told.min(axis=0), told.max(axis=0), nothing, nothing, named[low], named[high])
+        low, high, nothing = ends_of.argmin(axis=0), ends_of.argmax(axis=0), np.full(ends_of.shape[1], np.nan)
+        new = Ends(ends_of.min(axis=0), ends_of.max(axis=0), nothing, nothing, named[low], named[high])
         return Ends(
             **{
                 name: np.where(late if of.ndim == 1 else late[:, None], of, getattr(known, name))
@@ -413,7 +413,7 @@ def sampled(study: Study, boxes: ProbabilityBoxes) -> ProbabilityBoxes:
         boxes,
         mean=instead(boxes.mean, values.mean(axis=1)),
         std=instead(boxes.std, values.std(axis=1, ddof=1)),
-        quantiles=tuple(instead(known, told) for known, told in zip(boxes.quantiles, quantiles, strict=True)),
+        quantiles=tuple(instead(known, ends_of) for known, ends_of in zip(boxes.quantiles, quantiles, strict=True)),
         places=len(given),
         inner=inner,
     )

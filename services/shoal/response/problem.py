@@ -87,7 +87,7 @@ def _select_model(
 
     if asked.engine != "gauss":
         raise InputError(f"tolerance: models are chosen for engine gauss only, found engine {asked.engine!r}")
-    middle = inputs.values(inputs.germs(np.full((1, len(inputs)), 0.5)))
+    middle = inputs.values(inputs.quantiles(np.full((1, len(inputs)), 0.5)))
     sections = (scene.markers[one.place].body for one in limits if of_section(one.quantity, scene))
     nominal = scene.with_values({path: float(at[0]) for path, at in middle.items()})
     selection = select(nominal, tolerance, times, meshed=tuple(sections))

@@ -123,7 +123,7 @@ def _parameter(name: str, known: Any, scene: Scene) -> UncertainParameter:
     if len(paths) > 1 and nominal[paths[0]]:
         # Tied fields keep the ratios that the scene states.
         factors = {path: value / nominal[paths[0]] for path, value in nominal.items()}
-    low, high = marginal.value(marginal.germ(np.array([1e-12, 1 - 1e-12])))
+    low, high = marginal.value(marginal.quantile(np.array([1e-12, 1 - 1e-12])))
     if isinstance(marginal, Interval):
         low, high = marginal.low, marginal.high
     for end in (low, high):
@@ -163,7 +163,7 @@ def _nominal(path: str, scene: Scene) -> float:
 def _marginal(name: str, known: Any, nominal: float) -> Marginal:
     if isinstance(known, str):
         return _distribution(name, known)
-    if hasattr(known, "germ") and hasattr(known, "basis"):
+    if hasattr(known, "quantile") and hasattr(known, "basis"):
         return cast(Marginal, known)
     if hasattr(known, "computeQuantile"):
         return Frozen(_OpenTurns(name, known), str(known))
@@ -322,12 +322,12 @@ def from_salib(problem: Mapping[str, Any]) -> dict[str, Marginal]:
 
 def to_salib(inputs: Inputs) -> dict[str, Any]:
     """The problem of these parameters; intervals are uniform there. Raises InputError."""
-    told = [_salib_form(one.name, one.marginal) for one in inputs.parameters]
+    stated = [_salib_form(one.name, one.marginal) for one in inputs.parameters]
     return {
-        "num_vars": len(told),
+        "num_vars": len(stated),
         "names": inputs.names,
-        "bounds": [numbers for _, numbers in told],
-        "dists": [kind for kind, _ in told],
+        "bounds": [numbers for _, numbers in stated],
+        "dists": [kind for kind, _ in stated],
     }
 
 

@@ -53,14 +53,14 @@ class Decay:
         return found
 
 
-def likeliest(inputs: Inputs, germs: Array, answers: Array, begun: Decay | None = None) -> Decay:
+def likeliest(inputs: Inputs, xi: Array, answers: Array, begun: Decay | None = None) -> Decay:
     """Of one column, (runs,), or one for several, (runs, columns), by the likelihood with the size of each left free.
 
     begun: where the search begins
     """
     count, some = len(inputs), slice(TOLD)
-    y = answers[some].reshape(len(germs[some]), -1)
-    bases, y = _bases(inputs, germs[some]), y - y.mean(axis=0)
+    y = answers[some].reshape(len(xi[some]), -1)
+    bases, y = _bases(inputs, xi[some]), y - y.mean(axis=0)
 
     def unlikely(x: Array) -> tuple[float, Array]:
         return _unlikely(Decay(x[:-1].reshape(count, 2), float(x[-1])), bases, y)
@@ -72,10 +72,10 @@ def likeliest(inputs: Inputs, germs: Array, answers: Array, begun: Decay | None 
     return Decay(found[:-1].reshape(count, 2), float(found[-1]))
 
 
-def _bases(inputs: Inputs, germs: Array) -> list[Array]:
+def _bases(inputs: Inputs, xi: Array) -> list[Array]:
     """Polynomials of every parameter from degree 1, (runs, degrees) each."""
     degrees = inputs.highest(HIGHEST)
-    return [inputs.polynomials(k, germs[:, k], degree)[:, 1:] for k, degree in enumerate(degrees)]
+    return [inputs.polynomials(k, xi[:, k], degree)[:, 1:] for k, degree in enumerate(degrees)]
 
 
 def _unlikely(decay: Decay, bases: list[Array], y: Array) -> tuple[float, Array]:
@@ -108,23 +108,23 @@ def _unlikely(decay: Decay, bases: list[Array], y: Array) -> tuple[float, Array]
     return float(value), np.append(found, noise * middle * trace)
 
 
-def regularised(inputs: Inputs, germs: Array, values: Array, decay: Decay) -> Expansion:
+def regularised(inputs: Inputs, xi: Array, values: Array, decay: Decay) -> Expansion:
     """Of all columns, (runs, columns), with these variances."""
     terms, variances = _largest(inputs, decay)
-    basis, mean = inputs.basis(germs, terms), values.mean(axis=0)
+    basis, mean = inputs.basis(xi, terms), values.mean(axis=0)
     kernel = (basis * variances) @ basis.T
-    kernel += np.exp(decay.noise) * np.mean(np.diag(kernel)) * np.eye(len(germs))
+    kernel += np.exp(decay.noise) * np.mean(np.diag(kernel)) * np.eye(len(xi))
     factor = cholesky(kernel, lower=True)
-    inverse = cho_solve((factor, True), np.eye(len(germs)))
+    inverse = cho_solve((factor, True), np.eye(len(xi)))
     weights = cho_solve((factor, True), values - mean)
     coefficients = variances[:, None] * (basis.T @ weights)
     coefficients[0] += mean
     missed = weights / np.diag(inverse)[:, None]
     left_out, squares = unexplained(values, missed)
-    outer = outermost(inputs, germs)
+    outer = outermost(inputs, xi)
     if outer.any():
         beyond = np.linalg.solve(inverse[np.ix_(outer, outer)], weights[outer])
-        left_out = np.maximum(left_out, np.sqrt((beyond**2).sum(axis=0) / len(germs)))
+        left_out = np.maximum(left_out, np.sqrt((beyond**2).sum(axis=0) / len(xi)))
     return Expansion(inputs, terms, coefficients, left_out, squares)
 
 

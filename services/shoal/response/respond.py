@@ -120,30 +120,30 @@ def _broken_off(runs: CachedModel) -> Found:
 
 def _statistics(study: Study, found: Found) -> Statistics:
     runs = study.runs
-    told = sampled = of_runs(runs.values, found.indices, len(study.inputs))
+    known = sampled = of_runs(runs.values, found.indices, len(study.inputs))
     if isinstance(found.surrogate, Expansion):
-        told = of_expansion(found.surrogate, study.inputs, found.error, len(runs.germs), study.seed)
+        known = of_expansion(found.surrogate, study.inputs, found.error, len(runs.xi), study.seed)
         if found.linked is not None:
-            told = _over(told, found.linked, study)
+            known = _over(known, found.linked, study)
         if found.errors is not None:
-            told = replace(told, error=found.errors[0], std_error=found.errors[1])
+            known = replace(known, error=found.errors[0], std_error=found.errors[1])
         if found.indices is None:
-            sampled = replace(sampled, first=told.first, total=told.total)
-        told = told if found.coarse is None else either(found.coarse, sampled, told)
+            sampled = replace(sampled, first=known.first, total=known.total)
+        known = known if found.coarse is None else either(found.coarse, sampled, known)
     if found.quantiles is not None:
-        told = replace(told, quantiles=found.quantiles)
-    return masked(told, study.largest(np.nan_to_num(told.std), runs.values))
+        known = replace(known, quantiles=found.quantiles)
+    return masked(known, study.largest(np.nan_to_num(known.std), runs.values))
 
 
-def _over(told: Statistics, linked: LinkedMoments, study: Study) -> Statistics:
+def _over(known: Statistics, linked: LinkedMoments, study: Study) -> Statistics:
     """With those of the columns that something else than the expansion tells."""
-    quantiles, first, total = told.quantiles.copy(), told.first.copy(), told.total.copy()
+    quantiles, first, total = known.quantiles.copy(), known.first.copy(), known.total.copy()
     for columns, link in linked.links:
         answers = link(study.inputs.sobol(PLACES, study.seed + 1))
         quantiles[:, columns] = np.quantile(answers, QUANTILES, axis=0)
         if not study.inputs.correlations:
             first[:, columns], total[:, columns] = link.indices()
-    return replace(told, mean=linked.mean, std=np.sqrt(linked.variance), quantiles=quantiles, first=first, total=total)
+    return replace(known, mean=linked.mean, std=np.sqrt(linked.variance), quantiles=quantiles, first=first, total=total)
 
 
 def respond_markers(problem: UncertainProblem) -> ModelResponse:

@@ -154,8 +154,8 @@ class Response(Concluded):
 
     def missed(self, gap: float) -> dict[str, float]:
         """Which markers' quantities have a larger gap than that, and theirs, worst first. Of intervals only."""
-        told = {f"{marker}.{name}": self.gap(marker, name) for marker in self.markers for name in self.quantities}
-        return dict(sorted(((name, one) for name, one in told.items() if one > gap), key=lambda pair: -pair[1]))
+        entries = {f"{marker}.{name}": self.gap(marker, name) for marker in self.markers for name in self.quantities}
+        return dict(sorted(((name, one) for name, one in entries.items() if one > gap), key=lambda pair: -pair[1]))
 
     def moved(self) -> dict[str, dict[str, Any]]:
         """Of every marker's quantity the bound that a finer mesh moves furthest [m or rad], and when, sorted so."""
@@ -173,20 +173,20 @@ class Response(Concluded):
 
     def table(self) -> tuple[list[str], Array]:
         """Header and rows over time of what is told of every marker, (instants, columns)."""
-        told: dict[str, Array] = {}
+        entries: dict[str, Array] = {}
         if self.bounds is not None:
-            told = {name: getattr(self.bounds, name) for name in BOUNDS}
+            entries = {name: getattr(self.bounds, name) for name in BOUNDS}
         if self.statistics is not None:
-            told = {"mean": self.statistics.mean, "std": self.statistics.std}
-            told |= {f"q{q:g}": self.statistics.quantiles[k] for k, q in enumerate(QUANTILES)}
+            entries = {"mean": self.statistics.mean, "std": self.statistics.std}
+            entries |= {f"q{q:g}": self.statistics.quantiles[k] for k, q in enumerate(QUANTILES)}
         if self.boxes is not None:
             sides = "lower", "upper", "lower_outer", "upper_outer"
-            told = {f"{name}_{side}": getattr(of, side) for name, of in self.boxes.named().items() for side in sides}
+            entries = {f"{name}_{side}": getattr(of, side) for name, of in self.boxes.named().items() for side in sides}
         header, columns = ["t"], [self.times]
         for marker in self.markers:
             for quantity in self.quantities:
-                header += [f"{marker}.{quantity}.{name}" for name in told]
-                columns += [self.column(marker, quantity, of) for of in told.values()]
+                header += [f"{marker}.{quantity}.{name}" for name in entries]
+                columns += [self.column(marker, quantity, of) for of in entries.values()]
         return header, np.column_stack(columns)
 
     def to_xarray(self) -> xr.Dataset:
@@ -277,7 +277,7 @@ class Response(Concluded):
             "parameters": self._parameters(),
             "left_out": {name: why for joint in self.inputs.joints for name, why in joint.left.items()},
             "bounds": {} if self.bounds is None else self._by_marker(self._bounds),
-            "statistics": self._told_statistics(),
+            "statistics": self._all_statistics(),
             "mesh_error": plain(self.mesh_error),
             "step_error": plain(self.step_error),
             "error": plain(self.errors.total),
@@ -297,13 +297,13 @@ class Response(Concluded):
                 described[one.name] |= {"low": one.marginal.low, "high": one.marginal.high}
         return described
 
-    def _told_statistics(self) -> dict[str, Any]:
+    def _all_statistics(self) -> dict[str, Any]:
         if self.boxes is not None:
             return self._by_marker(self._boxes)
         return {} if self.statistics is None else self._by_marker(self._statistics)
 
-    def _by_marker(self, told: Any) -> dict[str, Any]:
-        return {marker: {name: told(marker, name) for name in self.quantities} for marker in self.markers}
+    def _by_marker(self, entries: Any) -> dict[str, Any]:
+        return {marker: {name: entries(marker, name) for name in self.quantities} for marker in self.markers}
 
     def _bounds(self, marker: str, quantity: str) -> dict[str, Any]:
         found = self.bounds
@@ -333,21 +333,21 @@ class Response(Concluded):
         def at(of: Array) -> Any:
             return plain(self.column(marker, quantity, of))
 
-        told: dict[str, Any] = {"t": plain(self.times), "intervals": list(found.names)}
+        entries: dict[str, Any] = {"t": plain(self.times), "intervals": list(found.names)}
         for side in ("lower", "upper"):
             for name, of in (("mean", found.mean), ("std", found.std)):
-                told[f"{name}_{side}"] = at(getattr(of, side))
-                told[f"{name}_{side}_outer"] = at(getattr(of, f"{side}_outer"))
-                told[f"argument_{name}_{side}"] = plain(self.column(marker, quantity, getattr(of, f"at_{side}").T).T)
+                entries[f"{name}_{side}"] = at(getattr(of, side))
+                entries[f"{name}_{side}_outer"] = at(getattr(of, f"{side}_outer"))
+                entries[f"argument_{name}_{side}"] = plain(self.column(marker, quantity, getattr(of, f"at_{side}").T).T)
             levels = [f"{q:g}" for q in QUANTILES]
             for name, key in ((f"quantiles_{side}", side), (f"quantiles_{side}_outer", f"{side}_outer")):
-                told[name] = {q: at(getattr(of, key)) for q, of in zip(levels, found.quantiles, strict=True)}
-            told[f"argument_quantiles_{side}"] = {
+                entries[name] = {q: at(getattr(of, key)) for q, of in zip(levels, found.quantiles, strict=True)}
+            entries[f"argument_quantiles_{side}"] = {
                 q: plain(self.column(marker, quantity, getattr(of, f"at_{side}").T).T)
                 for q, of in zip(levels, found.quantiles, strict=True)
             }
         if found.shares is not None:
-            told["sobol"] = {
+            entries["sobol"] = {
                 name: {
                     f"{index}_{side}": at(found.shares[i, j, k])
                     for i, index in enumerate(("first", "total"))
@@ -355,7 +355,7 @@ class Response(Concluded):
                 }
                 for k, name in enumerate(self.random)
             }
-        return told
+        return entries
 
     def _statistics(self, marker: str, quantity: str) -> dict[str, Any]:
         found = self.statistics

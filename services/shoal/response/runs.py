@@ -41,7 +41,7 @@ class TooManyRunsError(Exception):
 
 @dataclass
 class CachedModel:
-    """A model with a memory: call it with germs.
+    """A model with a memory: call it with standardised variables.
 
     most: runs that it may make; progress: is told after every call how many there are; controls: runs all over the box
     that test a surrogate; named: runs at the arguments of its extremes, which attain the bounds; aside: runs that were
@@ -54,22 +54,22 @@ class CachedModel:
     progress: Callable[[int], None] | None = None
     repeated: int = 0
     why: str = ""
-    _germs: list[Array] = field(default_factory=list)
+    _xi: list[Array] = field(default_factory=list)
     _values: list[Array] = field(default_factory=list)
     _good: list[BoolArray] = field(default_factory=list)
     controls: int = 0
     named: int = 0
     aside: int = 0
 
-    def __call__(self, germs: Array) -> int:
-        """Make the runs at these germs that have not been made; how many they are.
+    def __call__(self, xi: Array) -> int:
+        """Make the runs at these places that have not been made; how many they are.
 
         Raises TooManyRunsError, InputError.
         """
-        return self.all(self._fresh(np.atleast_2d(germs)))
+        return self.all(self._fresh(np.atleast_2d(xi)))
 
     def all(self, fresh: Array) -> int:
-        """Make the runs at all of these germs; how many they are.
+        """Make the runs at all of these places; how many they are.
 
         Raises TooManyRunsError, InputError, and ComputationError if none may be believed.
         """
@@ -80,39 +80,39 @@ class CachedModel:
         return self.keep(fresh, self.model(self.inputs.values(fresh)))
 
     def keep(self, fresh: Array, answers: Answers) -> int:
-        """Keep runs that were made at these germs; how many they are. Raises InputError, ComputationError."""
+        """Keep runs that were made at these places; how many they are. Raises InputError, ComputationError."""
         if answers.values.shape[0] != len(fresh):
             raise InputError(f"model: needs one answer a run, found {answers.values.shape[0]} for {len(fresh)}")
-        self._germs.append(fresh)
+        self._xi.append(fresh)
         self._values.append(answers.values)
         self._good.append(answers.good)
         self.repeated += answers.repeated
         self.why = self.why or answers.why
-        if self.failed == sum(map(len, self._germs)):
+        if self.failed == sum(map(len, self._xi)):
             raise ComputationError(f"all {self.failed} runs failed: {self.why}")
         if self.progress is not None:
             self.progress(self.evaluations)
         return len(fresh)
 
-    def _fresh(self, germs: Array) -> Array:
+    def _fresh(self, xi: Array) -> Array:
         kept: list[Array] = []
-        known = np.concatenate(self._germs) if self._germs else np.empty((0, germs.shape[1]))
-        for germ in germs:
+        known = np.concatenate(self._xi) if self._xi else np.empty((0, xi.shape[1]))
+        for one in xi:
             beside = np.concatenate([known, np.array(kept)]) if kept else known
-            if not len(beside) or np.min(np.max(np.abs(beside - germ), axis=1)) > SAME:
-                kept.append(germ)
-        return np.array(kept).reshape(-1, germs.shape[1])
+            if not len(beside) or np.min(np.max(np.abs(beside - one), axis=1)) > SAME:
+                kept.append(one)
+        return np.array(kept).reshape(-1, xi.shape[1])
 
     def set_aside(self) -> None:
         """Forget all runs but their number, where they do not suit the method that goes on."""
         self.aside, self.why = self.evaluations, ""
-        self._germs, self._values, self._good = [], [], []
+        self._xi, self._values, self._good = [], [], []
 
     def part(self, which: BoolArray) -> CachedModel:
         """Some of the good runs, (runs,), for fits to fewer of them."""
-        germs, values = self.germs[which], self.values[which]
+        xi, values = self.xi[which], self.values[which]
         return CachedModel(
-            self.model, self.inputs, self.most, None, 0, "", [germs], [values], [np.ones(len(germs), dtype=bool)]
+            self.model, self.inputs, self.most, None, 0, "", [xi], [values], [np.ones(len(xi), dtype=bool)]
         )
 
     @property
@@ -123,7 +123,7 @@ class CachedModel:
     @property
     def evaluations(self) -> int:
         """Runs made, those that failed among them."""
-        return self.aside + sum(map(len, self._germs))
+        return self.aside + sum(map(len, self._xi))
 
     @property
     def own(self) -> int:
@@ -137,7 +137,7 @@ class CachedModel:
 
     def describe_failed(self) -> str:
         """Between which values of the parameters runs have failed, and those of the first, in words."""
-        bad = np.concatenate(self._germs)[~np.concatenate(self._good)]
+        bad = np.concatenate(self._xi)[~np.concatenate(self._good)]
         if not len(bad):
             return ""
         values = self.inputs.named(bad)
@@ -148,9 +148,9 @@ class CachedModel:
         )
 
     @property
-    def germs(self) -> Array:
+    def xi(self) -> Array:
         """Of the good runs, (runs, parameters)."""
-        return np.concatenate(self._germs)[np.concatenate(self._good)]
+        return np.concatenate(self._xi)[np.concatenate(self._good)]
 
     @property
     def values(self) -> Array:
@@ -161,7 +161,7 @@ class CachedModel:
     def attaining(self) -> Array:
         """Germs of the runs that attain the least or the largest answer of some column, (some, parameters)."""
         values = self.values
-        return np.asarray(self.germs[np.union1d(values.argmin(axis=0), values.argmax(axis=0))])
+        return np.asarray(self.xi[np.union1d(values.argmin(axis=0), values.argmax(axis=0))])
 
 
 class TimeIsUpError(TooManyRunsError):
@@ -193,10 +193,10 @@ class Keep:
         points = np.stack(list(values.values()))
         known = None if self.memory is None else self.memory.recall(label, points)
         if known is not None:
-            good, told = known[:-1, -1] == 1.0, known.shape[1] - 1 - stated
+            good, columns = known[:-1, -1] == 1.0, known.shape[1] - 1 - stated
             why = "" if good.all() else "they failed before the study was broken off"
-            away = known[:-1, told:-1].copy() if stated else None
-            return Answers(known[:-1, :told].copy(), good, int(known[-1, -1]), why, away)
+            away = known[:-1, columns:-1].copy() if stated else None
+            return Answers(known[:-1, :columns].copy(), good, int(known[-1, -1]), why, away)
         if self.end is not None and clock.now() > self.end:
             self.over = True
             raise TimeIsUpError

@@ -118,7 +118,7 @@ def designs(inputs: Inputs, base: int, seed: int) -> Array:
         mixed = one.copy()
         mixed[:, k] = other[:, k]
         found.append(mixed)
-    return inputs.germs(np.concatenate(found))
+    return inputs.quantiles(np.concatenate(found))
 
 
 def jansen(values: Array, parameters: int) -> Array:
@@ -167,7 +167,7 @@ class Moments(Protocol):
 
 def moment_errors(study: Study, found: Moments, fitted: Callable[[Study], Moments]) -> tuple[Array, Array]:
     """Within which mean and std lie with 95 % confidence, (columns,) each; fitted: what fewer runs tell."""
-    made, std, left_out = len(study.runs.germs), np.sqrt(found.variance), found.left_out
+    made, std, left_out = len(study.runs.xi), np.sqrt(found.variance), found.left_out
     squares = left_out if found.squares is None else np.maximum(found.squares, left_out)
     missing = np.divide(left_out**2, 2 * std, out=np.zeros_like(std), where=std > 0)
     scatter = SURE * np.array([left_out / np.sqrt(made), np.hypot(squares / np.sqrt(made), missing)])

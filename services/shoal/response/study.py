@@ -104,8 +104,8 @@ class Study:
 class Other(Protocol):
     """What tells some columns better than an expansion."""
 
-    def __call__(self, germs: Array) -> Array:
-        """Answers at any germ without a run, (places, columns)."""
+    def __call__(self, xi: Array) -> Array:
+        """Answers at any place without a run, (places, columns)."""
         ...
 
     def indices(self) -> Array:
@@ -144,11 +144,11 @@ class Enclosure:
 
 
 @dataclass(frozen=True)
-class Looked:
+class DatedEnclosure:
     """Bounds by so many runs."""
 
     runs: int
-    told: Enclosure
+    enclosure: Enclosure
 
 
 @dataclass(frozen=True)
@@ -169,12 +169,12 @@ class Found:
     error: Array | None = None
     indices: Array | None = None
     coarse: BoolArray | None = None
-    foretold: bool = False
+    of_cycles: bool = False
     share: float = 0.0
     quantiles: Array | None = None
     errors: tuple[Array, Array] | None = None
     linked: LinkedMoments | None = None
-    looked: Looked | None = None
+    enclosed: DatedEnclosure | None = None
     drawn: int | None = None
 
 

@@ -52,7 +52,7 @@ class Transformation(Protocol):
         """Part of the deviation that no run can tell of, (columns,)."""
         ...
 
-    def __call__(self, germs: Array) -> Array:
+    def __call__(self, xi: Array) -> Array:
         """(places, columns)."""
         ...
 
@@ -71,15 +71,13 @@ class Transformation(Protocol):
 
 def columns_of(study: Study, columns: IntArray) -> Study:
     """Of these columns alone."""
-    return with_answers(study, study.inputs, study.runs.germs, study.runs.values[:, columns])
+    return with_answers(study, study.inputs, study.runs.xi, study.runs.values[:, columns])
 
 
-def with_answers(study: Study, inputs: Inputs, germs: Array, values: Array) -> Study:
+def with_answers(study: Study, inputs: Inputs, xi: Array, values: Array) -> Study:
     """With other answers."""
-    good = np.ones(len(germs), dtype=bool)
-    return replace(
-        study, runs=CachedModel(study.runs.model, inputs, len(germs), None, 0, "", [germs], [values], [good])
-    )
+    good = np.ones(len(xi), dtype=bool)
+    return replace(study, runs=CachedModel(study.runs.model, inputs, len(xi), None, 0, "", [xi], [values], [good]))
 
 
 NODES, REACH = 2**13, 9.0
@@ -91,13 +89,13 @@ SPAN, NOWHERE = 16.0, 1e-15
 def nodes(inputs: Inputs, k: int, reach: float) -> tuple[Array, Array]:
     """Germs of one parameter and their weights, (nodes,) each; denser towards its ends where it is not normal."""
     if inputs.unbounded[k]:
-        germs = np.linspace(-reach, reach, NODES)
-        weights = np.exp(-0.5 * germs**2)
+        xi = np.linspace(-reach, reach, NODES)
+        weights = np.exp(-0.5 * xi**2)
     else:
         angle = np.pi * ((np.arange(NODES) + 0.5) / NODES - 0.5)
-        germs = inputs.germs(np.tile(0.5 + 0.5 * np.sin(angle)[:, None], len(inputs)))[:, k]
+        xi = inputs.quantiles(np.tile(0.5 + 0.5 * np.sin(angle)[:, None], len(inputs)))[:, k]
         weights = np.cos(angle)
-    return germs, weights / weights.sum()
+    return xi, weights / weights.sum()
 
 
 @dataclass(frozen=True)
@@ -119,7 +117,7 @@ class Combined:
         """The standard deviation."""
         return float(np.sqrt(self.weights @ self.places**2))
 
-    def germ(self, x: Array) -> Array:
+    def quantile(self, x: Array) -> Array:
         """The place."""
         return np.interp(x, np.cumsum(self.weights), self.places)
 
@@ -129,13 +127,13 @@ class Combined:
 
 
 def combined(inputs: Inputs, way: Array) -> Combined:
-    """Of the standardised germs, by the convolution of their distributions on a grid."""
+    """Of the standardised variables, by the convolution of their distributions on a grid."""
     grid, step = np.linspace(-SPAN, SPAN, NODES, endpoint=False, retstep=True)
     spectrum = np.ones(NODES // 2 + 1, dtype=complex)
     for k, part in enumerate(way):
-        germs, weights = nodes(inputs, k, REACH)
+        xi, weights = nodes(inputs, k, REACH)
         # Each node is shared between its neighbours on the grid, which keeps the mean.
-        at = np.clip(part * inputs.polynomials(k, germs, 1)[:, 1] / step, 1 - NODES / 2, NODES / 2 - 2)
+        at = np.clip(part * inputs.polynomials(k, xi, 1)[:, 1] / step, 1 - NODES / 2, NODES / 2 - 2)
         left = np.floor(at).astype(int)
         shared = np.zeros(NODES)
         np.add.at(shared, left % NODES, weights * (left + 1 - at))
@@ -167,9 +165,9 @@ class Exponential:
     seed: int
     text = "an expansion of their logarithm"
 
-    def __call__(self, germs: Array) -> Array:
+    def __call__(self, xi: Array) -> Array:
         """(places, columns)."""
-        return np.asarray(self.signs * np.exp(self.logarithm(germs)))
+        return np.asarray(self.signs * np.exp(self.logarithm(xi)))
 
     def again(self, study: Study, fitted: Fitted) -> Exponential:
         """For other runs."""
@@ -233,16 +231,16 @@ class Exponential:
         """
         of, found = self.logarithm, np.empty(len(self.signs))
         x = inside(qmc.Sobol(len(of.inputs), rng=self.seed).random(TILTED))
-        plain = of.inputs.germs(x)
+        plain = of.inputs.quantiles(x)
         for column in range(len(found)):
-            germs = plain.copy()
+            xi = plain.copy()
             for k in range(len(of.inputs)):
                 if (own := self._own(k)).any():
                     at, weights = nodes(of.inputs, k, REACH)
                     weights = weights * np.exp(order * self._basis(k, at) @ of.coefficients[own, column])
                     # The middle of each step, so that places lie on either side of its node.
-                    germs[:, k] = np.interp(x[:, k], (np.cumsum(weights) - 0.5 * weights) / weights.sum(), at)
-            cross = of.inputs.basis(germs, of.terms[self._cross]) @ of.coefficients[self._cross, column]
+                    xi[:, k] = np.interp(x[:, k], (np.cumsum(weights) - 0.5 * weights) / weights.sum(), at)
+            cross = of.inputs.basis(xi, of.terms[self._cross]) @ of.coefficients[self._cross, column]
             found[column] = np.exp(order * cross).mean()
         return found
 
@@ -252,8 +250,8 @@ class Exponential:
         found = np.ones((2, len(inputs), len(self.signs)))
         for k in range(len(inputs)):
             if (own := self._own(k)).any():
-                germs, weights = nodes(inputs, k, reach)
-                part = np.exp(self._basis(k, germs) @ self.logarithm.coefficients[own])
+                xi, weights = nodes(inputs, k, reach)
+                part = np.exp(self._basis(k, xi) @ self.logarithm.coefficients[own])
                 found[:, k] = weights @ part, weights @ part**2
         return found
 
@@ -261,10 +259,10 @@ class Exponential:
         """Terms of parameter k alone."""
         return np.asarray(self._alone & (self.logarithm.terms[:, k] > 0))
 
-    def _basis(self, k: int, germs: Array) -> Array:
-        """Polynomials of these terms at germs of parameter k, (germs, terms)."""
+    def _basis(self, k: int, xi: Array) -> Array:
+        """Polynomials of these terms at standardised variables of parameter k, (standardised variables, terms)."""
         degrees = self.logarithm.terms[self._own(k), k]
-        return self.logarithm.inputs.polynomials(k, germs, int(degrees.max()))[:, degrees]
+        return self.logarithm.inputs.polynomials(k, xi, int(degrees.max()))[:, degrees]
 
     def _split(self, places: Array) -> tuple[Array, Array]:
         """The exponential of the functions of one parameter, and of all but the constant, (places, columns) each."""
@@ -287,7 +285,7 @@ class Exponential:
 
 def _exponential(study: Study, fitted: Fitted) -> Exponential:
     values = study.runs.values
-    logarithms = with_answers(study, study.inputs, study.runs.germs, np.log(np.abs(values)))
+    logarithms = with_answers(study, study.inputs, study.runs.xi, np.log(np.abs(values)))
     return Exponential(fitted(logarithms), np.sign(values[0]), len(values))
 
 
@@ -314,7 +312,7 @@ TURNS = 12
 
 @dataclass(frozen=True)
 class Ridge:
-    """One column as an expansion along a direction of the standardised germs.
+    """One column as an expansion along a direction of the standardised variables.
 
     way: the direction, of length 1, (parameters,); decay: of the coefficients, where that is what holds them
     """
@@ -325,9 +323,9 @@ class Ridge:
     decay: Decay | None = None
     text = "a function of one direction"
 
-    def __call__(self, germs: Array) -> Array:
+    def __call__(self, xi: Array) -> Array:
         """(places, 1)."""
-        return self.along((_standardised(self.inputs, germs) @ self.way)[:, None])
+        return self.along((_standardised(self.inputs, xi) @ self.way)[:, None])
 
     def again(self, study: Study, fitted: Fitted) -> Ridge:
         """For other runs."""
@@ -365,7 +363,7 @@ class Ridge:
 
 def _turned_best(study: Study, ways: Sequence[Array]) -> tuple[Array, float]:
     """From the best of some directions, and what polynomials along it leave of the answers, root of the mean square."""
-    z, y, found = _standardised(study.inputs, study.runs.germs), study.runs.values[:, 0], []
+    z, y, found = _standardised(study.inputs, study.runs.xi), study.runs.values[:, 0], []
     for way in ways:
         turned = way / np.linalg.norm(way)
         for degree in ALONG_DEGREES:
@@ -379,7 +377,7 @@ def _ridge(study: Study, fitted: Fitted, way: Array, decay: Decay | None = None)
     inputs, values = study.inputs, study.runs.values
     marginal: Marginal = Normal(0.0, 1.0) if inputs.unbounded.all() else combined(inputs, way)
     one = Inputs((UncertainParameter("along", marginal, {}),))
-    places = (_standardised(inputs, study.runs.germs) @ way)[:, None]
+    places = (_standardised(inputs, study.runs.xi) @ way)[:, None]
     along = fitted(with_answers(study, one, places, values))
     if decay is None and along.left_out[0] > WELL_FITTED * values.std():
         decay = likeliest(one, places, values[:, 0])
@@ -423,20 +421,20 @@ def _rest(z: Array, y: Array, way: Array, degree: int) -> tuple[float, Array]:
     return float(missed @ missed), step - (step @ way) * way
 
 
-def _standardised(inputs: Inputs, germs: Array) -> Array:
+def _standardised(inputs: Inputs, xi: Array) -> Array:
     """With mean 0 and deviation 1, both (runs, parameters)."""
-    return np.stack([inputs.polynomials(k, germs[:, k], 1)[:, 1] for k in range(len(inputs))], axis=1)
+    return np.stack([inputs.polynomials(k, xi[:, k], 1)[:, 1] for k in range(len(inputs))], axis=1)
 
 
 def ridges(study: Study, found: Expansion, wanted: IntArray, fitted: Fitted) -> Sequence[tuple[IntArray, Ridge]]:
     """Of one column each, those that the expansion tells worst first."""
     inputs, runs = study.inputs, study.runs
-    if len(inputs) == 1 or len(runs.germs) < 2 * (len(inputs) + ALONG_DEGREES[-1]):
+    if len(inputs) == 1 or len(runs.xi) < 2 * (len(inputs) + ALONG_DEGREES[-1]):
         return []
-    known = [fit(inputs, runs.germs, runs.values, total_degree(len(inputs), 1)), found]
-    if size(len(inputs), 2) < len(runs.germs):
-        known.append(fit(inputs, runs.germs, runs.values, total_degree(len(inputs), 2)))
-    slopes, made, failures = [_slopes(one, runs.germs) for one in known], [], 0
+    known = [fit(inputs, runs.xi, runs.values, total_degree(len(inputs), 1)), found]
+    if size(len(inputs), 2) < len(runs.xi):
+        known.append(fit(inputs, runs.xi, runs.values, total_degree(len(inputs), 2)))
+    slopes, made, failures = [_slopes(one, runs.xi) for one in known], [], 0
     for column in wanted[np.argsort(-found.left_out[wanted], kind="stable")]:
         # The direction in which each of these expansions changes most (Constantine, Active Subspaces, 2015).
         ways = [np.linalg.eigh(one[:, :, column].T @ one[:, :, column])[1][:, -1] for one in slopes]
@@ -453,12 +451,12 @@ def ridges(study: Study, found: Expansion, wanted: IntArray, fitted: Fitted) -> 
     return made
 
 
-def _slopes(found: Expansion, germs: Array) -> Array:
-    """By every standardised germ, (runs, parameters, columns)."""
+def _slopes(found: Expansion, xi: Array) -> Array:
+    """By every place, (runs, parameters, columns)."""
     inputs, h = found.inputs, 1e-5
-    at, slopes = found(germs), []
+    at, slopes = found(xi), []
     for k in range(len(inputs)):
-        moved = germs.copy()
+        moved = xi.copy()
         moved[:, k] += h
         width = h * np.diff(inputs.polynomials(k, np.array([0.0, 1.0]), 1)[:, 1])[0]
         slopes.append((found(moved) - at) / width)
@@ -522,37 +520,45 @@ def untransformed(found: Expansion) -> Transformed:
 
 def transformed(study: Study, found: Expansion, wanted: BoolArray, fitted: Fitted) -> Transformed:
     """With links in those of the wanted columns, (columns,), that they tell clearly better."""
-    told = untransformed(found)
+    plain_first = untransformed(found)
     for kind in KINDS:
         for columns, link in kind(study, found, np.flatnonzero(wanted), fitted):
-            told = _better(study, told, columns, link, fitted)
-    return told
+            plain_first = _better(study, plain_first, columns, link, fitted)
+    return plain_first
 
 
-def compared(told: Transformed, found: Expansion) -> Transformed:
+def compared(plain_first: Transformed, found: Expansion) -> Transformed:
     """The links where they are still clearly better than another expansion."""
-    return _with(untransformed(found), told.links, told.left_out, told.squares)
+    return _with(untransformed(found), plain_first.links, plain_first.left_out, plain_first.squares)
 
 
-def _better(study: Study, told: Transformed, columns: IntArray, link: Transformation, fitted: Fitted) -> Transformed:
+def _better(
+    study: Study, plain_first: Transformed, columns: IntArray, link: Transformation, fitted: Fitted
+) -> Transformed:
     """With the link in those of these columns in which it is clearly better."""
-    part, left_out, squares = columns_of(study, columns), np.full(len(told.left_out), np.inf), told.squares.copy()
+    part, left_out, squares = (
+        columns_of(study, columns),
+        np.full(len(plain_first.left_out), np.inf),
+        plain_first.squares.copy(),
+    )
     with np.errstate(all="ignore"):
         missed, outer = _missed(part, link, fitted)
         found, squares[columns] = unexplained(part.runs.values, missed)
         sound = np.isfinite(link.mean) & np.isfinite(link.variance)
         left_out[columns] = np.where(sound, np.maximum(np.maximum(found, outer), link.beyond), np.inf)
-    return _with(told, [(columns, link)], left_out, squares)
+    return _with(plain_first, [(columns, link)], left_out, squares)
 
 
 def _with(
-    told: Transformed, links: Iterable[tuple[IntArray, Transformation]], left_out: Array, squares: Array
+    plain_first: Transformed, links: Iterable[tuple[IntArray, Transformation]], left_out: Array, squares: Array
 ) -> Transformed:
     """With links where their error, (columns,), is clearly smaller."""
-    better = left_out < CLEARLY * told.left_out
-    kept = [*_columns_where(told.links, ~better), *_columns_where(links, better)]
-    left_out, squares = (np.where(better, *pair) for pair in ((left_out, told.left_out), (squares, told.squares)))
-    return Transformed(told.plain, tuple(kept), left_out, squares)
+    better = left_out < CLEARLY * plain_first.left_out
+    kept = [*_columns_where(plain_first.links, ~better), *_columns_where(links, better)]
+    left_out, squares = (
+        np.where(better, *pair) for pair in ((left_out, plain_first.left_out), (squares, plain_first.squares))
+    )
+    return Transformed(plain_first.plain, tuple(kept), left_out, squares)
 
 
 def _columns_where(
@@ -570,15 +576,15 @@ def _missed(study: Study, link: Transformation, fitted: Fitted) -> tuple[Array, 
     runs = study.runs
     missed = np.empty_like(runs.values)
     for left in np.array_split(np.arange(len(missed)), FOLDS):
-        missed[left] = _foretold(study, link, fitted, left)
-    outer = np.flatnonzero(outermost(study.inputs, runs.germs))
-    beyond = _foretold(study, link, fitted, outer) if len(outer) else np.zeros((0, missed.shape[1]))
+        missed[left] = _prediction_errors(study, link, fitted, left)
+    outer = np.flatnonzero(outermost(study.inputs, runs.xi))
+    beyond = _prediction_errors(study, link, fitted, outer) if len(outer) else np.zeros((0, missed.shape[1]))
     return missed, np.sqrt((beyond**2).sum(axis=0) / len(missed))
 
 
-def _foretold(study: Study, link: Transformation, fitted: Fitted, left: IntArray) -> Array:
+def _prediction_errors(study: Study, link: Transformation, fitted: Fitted, left: IntArray) -> Array:
     """What a fit without them misses of these runs."""
-    kept = np.ones(len(study.runs.germs), dtype=bool)
+    kept = np.ones(len(study.runs.xi), dtype=bool)
     kept[left] = False
     other = link.again(replace(study, runs=study.runs.part(kept)), fitted)
-    return np.asarray(study.runs.values[left] - other(study.runs.germs[left]))
+    return np.asarray(study.runs.values[left] - other(study.runs.xi[left]))

@@ -75,7 +75,7 @@ def repeat_on_finer_mesh(machine: ResponseModel, runs: CachedModel) -> Finer | N
     values = runs.values
     attain = np.stack([values.argmin(axis=0), values.argmax(axis=0)])
     chosen = [run for run, _ in Counter(attain.ravel().tolist()).most_common(REPEATED)]
-    given = runs.inputs.values(runs.germs[chosen])
+    given = runs.inputs.values(runs.xi[chosen])
     answers = None
     for scene in on_finer_mesh(machine.scene, 2):
         answers = replace(machine, scene=scene, keep=None)(given)
@@ -149,7 +149,7 @@ def model_errors(machine: ResponseModel, runs: CachedModel, chosen: Sequence[int
     """Return the largest errors of some runs of a study. chosen: their numbers. Raises InputError."""
     found = unestimated(machine)
     for run in chosen:
-        given = {path: float(at[0]) for path, at in runs.inputs.values(runs.germs[[run]]).items()}
+        given = {path: float(at[0]) for path, at in runs.inputs.values(runs.xi[[run]]).items()}
         (careful, verification), _ = stable(
             machine.scene.with_values(given), lambda scene: run_verified(machine.engine, scene, machine.times)
         )
@@ -215,7 +215,7 @@ def _decisive(found: ModelResponse, seed: int) -> list[int]:
     """Return the numbers of the runs that attain most bounds, or of some that were drawn."""
     runs = found.runs
     if found.bounds is None:
-        drawn = np.random.default_rng(seed).choice(len(runs.germs), min(CHECKED, len(runs.germs)), False)
+        drawn = np.random.default_rng(seed).choice(len(runs.xi), min(CHECKED, len(runs.xi)), False)
         return list(drawn.tolist())
     used = Counter([*runs.values.argmin(axis=0).tolist(), *runs.values.argmax(axis=0).tolist()])
     return [run for run, _ in used.most_common(CHECKED)]

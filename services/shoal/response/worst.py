@@ -116,7 +116,7 @@ def _bound(found: Response, of: str) -> tuple[str, VerifiedRun]:
     arguments = found.column(marker, rest, (found.bounds.at_upper if above else found.bounds.at_lower).T).T
     instant = int(np.argmax(bound) if above else np.argmin(bound))
     # The margin to a bound of zero is the quantity itself, with its sign.
-    passed = Limit(of, marker, rest, above, 0.0)
-    shown = show(passed, found.stated, found.times, get_engine(found.engine), found.inputs, arguments[instant])
+    at_bound = Limit(of, marker, rest, above, 0.0)
+    shown = show(at_bound, found.stated, found.times, get_engine(found.engine), found.inputs, arguments[instant])
     value = -shown.margin if above else shown.margin
     return of, VerifiedRun(**{**vars(shown), "margin": value})

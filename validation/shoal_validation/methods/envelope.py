@@ -45,15 +45,15 @@ class Parted:
     expansion: Expansion
     parts: int
 
-    def __call__(self, germs: Array) -> Array:
+    def __call__(self, xi: Array) -> Array:
         """(places, columns)."""
-        return _joined(self.expansion(germs).reshape(len(germs), self.parts, 3, -1))
+        return _joined(self.expansion(xi).reshape(len(xi), self.parts, 3, -1))
 
-    def each(self, germs: Array, columns: IntArray) -> Array:
+    def each(self, xi: Array, columns: IntArray) -> Array:
         """(places,)."""
         count = self.expansion.coefficients.shape[1] // (3 * self.parts)
-        told = [self.expansion.each(germs, columns + count * k) for k in range(3 * self.parts)]
-        return _joined(np.stack(told, axis=1).reshape(len(germs), self.parts, 3, 1))[:, 0]
+        told = [self.expansion.each(xi, columns + count * k) for k in range(3 * self.parts)]
+        return _joined(np.stack(told, axis=1).reshape(len(xi), self.parts, 3, 1))[:, 0]
 
 
 def _joined(told: Array) -> Array:
@@ -83,7 +83,7 @@ def _by_parts(study: Study, method: str, parts: Parts) -> Found:
         raise InputError(f"method: {method}: {error}") from None
     told = np.stack([_told(seen.times, course, study.when, parts) for course in seen.courses])
     made = len(told)
-    found = fit(study.inputs, np.array(seen.germs), told.reshape(made, -1), terms)
+    found = fit(study.inputs, np.array(seen.xi), told.reshape(made, -1), terms)
     return Found(f"amplitude and phase as polynomials of degree {degree}, of {made} runs", Parted(found, told.shape[1]))
 
 

@@ -29,19 +29,19 @@ class Process:
     left_out: error at each run of the process through all others, root of the mean square, (columns,)
     """
 
-    germs: Array
+    xi: Array
     middle: Array
     weights: Array
     length: float
     left_out: Array
 
-    def __call__(self, germs: Array) -> Array:
-        """The answers at these germs."""
-        return np.asarray(self.middle + _correlation(germs, self.germs, self.length) @ self.weights)
+    def __call__(self, xi: Array) -> Array:
+        """The answers at these places."""
+        return np.asarray(self.middle + _correlation(xi, self.xi, self.length) @ self.weights)
 
-    def each(self, germs: Array, columns: IntArray) -> Array:
-        """One column at each germ."""
-        correlation = _correlation(germs, self.germs, self.length)
+    def each(self, xi: Array, columns: IntArray) -> Array:
+        """One column at each place."""
+        correlation = _correlation(xi, self.xi, self.length)
         return np.asarray(self.middle[columns] + np.einsum("ij,ji->i", correlation, self.weights[:, columns]))
 
 
@@ -53,19 +53,19 @@ def _correlation(one: Array, other: Array, length: float) -> Array:
 def kriging(study: Study) -> Plan:
     """Plan `count` runs, the centre and a star, and a process through them."""
     places = _places(study)
-    return Plan(places, lambda made: _best(made.runs.germs, made.runs.values), f"kriging through {len(places)} runs")
+    return Plan(places, lambda made: _best(made.runs.xi, made.runs.values), f"kriging through {len(places)} runs")
 
 
-def _best(germs: Array, values: Array) -> Process:
+def _best(xi: Array, values: Array) -> Process:
     """Return the process whose correlation length predicts left-out runs best."""
     middle = values.mean(axis=0)
     best, error = None, np.inf
     for length in LENGTHS:
-        inverse = np.linalg.inv(_correlation(germs, germs, length) + NUGGET * np.eye(len(germs)))
+        inverse = np.linalg.inv(_correlation(xi, xi, length) + NUGGET * np.eye(len(xi)))
         weights = inverse @ (values - middle)
         missed = (weights / np.diag(inverse)[:, None]) ** 2
         if best is None or missed.mean() < error:
-            best, error = Process(germs, middle, weights, length, np.sqrt(missed.mean(axis=0))), missed.mean()
+            best, error = Process(xi, middle, weights, length, np.sqrt(missed.mean(axis=0))), missed.mean()
     assert best is not None
     return best
 
@@ -76,16 +76,16 @@ class Spline:
 
     spline: RBFInterpolator
 
-    def __call__(self, germs: Array) -> Array:
-        """The answers at these germs."""
-        return np.asarray(self.spline(germs))
+    def __call__(self, xi: Array) -> Array:
+        """The answers at these places."""
+        return np.asarray(self.spline(xi))
 
-    def each(self, germs: Array, columns: IntArray) -> Array:
-        """One column at each germ."""
-        found = np.empty(len(germs))
-        for k in range(0, len(germs), 256):
+    def each(self, xi: Array, columns: IntArray) -> Array:
+        """One column at each place."""
+        found = np.empty(len(xi))
+        for k in range(0, len(xi), 256):
             some = slice(k, k + 256)
-            found[some] = self.spline(germs[some])[np.arange(len(germs[some])), columns[some]]
+            found[some] = self.spline(xi[some])[np.arange(len(xi[some])), columns[some]]
         return found
 
 
@@ -97,7 +97,7 @@ def rbf(study: Study) -> Plan:
 
 
 def _spline(study: Study) -> Spline:
-    return Spline(RBFInterpolator(study.runs.germs, study.runs.values, kernel="thin_plate_spline"))
+    return Spline(RBFInterpolator(study.runs.xi, study.runs.values, kernel="thin_plate_spline"))
 
 
 def _places(study: Study) -> Array:

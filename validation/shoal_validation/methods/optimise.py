@@ -46,7 +46,7 @@ def optimise(study: Study) -> Found:
     most = min(study.count or COUNT * parameters, runs.left)
     first = np.vstack([np.zeros((1, parameters)), unit, -unit, study.inputs.sobol(SPREAD * parameters, study.seed)])
     runs(first[:most])
-    searches = _begun(runs.germs, _goals(runs.values))
+    searches = _begun(runs.xi, _goals(runs.values))
     while runs.evaluations < most and np.any(searches.arms > FINEST):
         _poll(study, searches, most)
     ended = float(np.mean(searches.arms <= FINEST))
@@ -58,15 +58,15 @@ def _goals(values: Array) -> Array:
     return np.concatenate([-values, values], axis=1)
 
 
-def _begun(germs: Array, goals: Array) -> Searches:
+def _begun(xi: Array, goals: Array) -> Searches:
     """The first search of a goal begins at its best run, the others at the best of every second run."""
     every = np.arange(goals.shape[1])
-    places = np.empty((STARTS, goals.shape[1], germs.shape[1]))
+    places = np.empty((STARTS, goals.shape[1], xi.shape[1]))
     best = np.empty((STARTS, goals.shape[1]))
     for start in range(STARTS):
-        among = np.arange(len(germs)) if start == 0 else np.arange(start - 1, len(germs), STARTS - 1)
+        among = np.arange(len(xi)) if start == 0 else np.arange(start - 1, len(xi), STARTS - 1)
         at = among[goals[among].argmax(axis=0)]
-        places[start], best[start] = germs[at], goals[at, every]
+        places[start], best[start] = xi[at], goals[at, every]
     return Searches(places, best, np.full(best.shape, WIDEST))
 
 
@@ -74,29 +74,29 @@ def _poll(study: Study, searches: Searches, most: int) -> None:
     """One round: stars around the places with the longest arms, then the tops of the parabolas through them."""
     runs, parameters = study.runs, len(study.inputs)
     stars = _stars(searches)
-    made = len(runs.germs)
+    made = len(runs.xi)
     star = np.vstack([-np.eye(parameters), np.eye(parameters)])
     wanted = np.vstack([np.clip(centre + arm * star, -1, 1) for centre, arm, _ in stars])
     runs(wanted[: most - runs.evaluations])
     tops = np.vstack([_tops(study, searches, *one) for one in stars])
     runs(tops[: max(0, most - runs.evaluations)])
-    germs, goals = runs.germs, _goals(runs.values)
+    xi, goals = runs.xi, _goals(runs.values)
     size = np.tile(study.widths(runs.values), 2)
     for centre, arm, served in stars:
         # Places of other stars count as well, the first search of a goal takes the best run of all.
-        near = np.flatnonzero(np.abs(germs - centre).max(axis=1) <= 2 * arm)
+        near = np.flatnonzero(np.abs(xi - centre).max(axis=1) <= 2 * arm)
         for start in range(STARTS):
             these = np.flatnonzero(served[start])
             if not len(these) or not len(near):
                 continue
-            among = np.arange(len(germs)) if start == 0 else near
+            among = np.arange(len(xi)) if start == 0 else near
             at = among[goals[np.ix_(among, these)].argmax(axis=0)]
             reached = goals[at, these]
             gain = np.maximum(reached - searches.best[start, these], 0.0)
-            searches.places[start, these], searches.best[start, these] = germs[at], reached
+            searches.places[start, these], searches.best[start, these] = xi[at], reached
             slow = gain <= 1e-3 * arm * size[these]
             searches.arms[start, these[slow]] /= 4
-    if len(runs.germs) == made:
+    if len(runs.xi) == made:
         # All of it was known: finer stars tell more.
         for _, _, served in stars:
             searches.arms[served] /= 4
@@ -121,9 +121,9 @@ def _stars(searches: Searches) -> list[tuple[Array, float, Array]]:
 
 def _tops(study: Study, searches: Searches, centre: Array, arm: float, served: Array) -> Array:
     """Where the parabolas along the axes have their tops, for the goals that are served: at most a few places."""
-    germs, parameters = study.runs.germs, len(study.inputs)
-    near = np.abs(germs - centre).max(axis=1) <= 2 * arm
-    away = (germs[near] - centre) / arm
+    xi, parameters = study.runs.xi, len(study.inputs)
+    near = np.abs(xi - centre).max(axis=1) <= 2 * arm
+    away = (xi[near] - centre) / arm
     terms = np.hstack([np.ones((len(away), 1)), away, away**2])
     which = np.flatnonzero(served.any(axis=0))
     fitted = np.linalg.lstsq(terms, _goals(study.runs.values)[near][:, which], rcond=None)[0]

@@ -35,7 +35,7 @@ HIGHEST = 5
 
 
 def _plan(places: Array, terms: Terms, about: str) -> Plan:
-    return Plan(places, lambda study: fit(study.inputs, study.runs.germs, study.runs.values, terms), about)
+    return Plan(places, lambda study: fit(study.inputs, study.runs.xi, study.runs.values, terms), about)
 
 
 def chebyshev(study: Study) -> Plan:

@@ -31,28 +31,28 @@ class Pieces:
     cut: int
     cells: list[Expansion]
 
-    def __call__(self, germs: Array) -> Array:
-        """The answers at these germs."""
-        found = np.empty((len(germs), self.cells[0].coefficients.shape[1]))
-        cell, local = located(germs, self.cut)
+    def __call__(self, xi: Array) -> Array:
+        """The answers at these places."""
+        found = np.empty((len(xi), self.cells[0].coefficients.shape[1]))
+        cell, local = located(xi, self.cut)
         for k in np.unique(cell):
             found[cell == k] = self.cells[k](local[cell == k])
         return found
 
-    def each(self, germs: Array, columns: IntArray) -> Array:
-        """One column at each germ."""
-        found = np.empty(len(germs))
-        cell, local = located(germs, self.cut)
+    def each(self, xi: Array, columns: IntArray) -> Array:
+        """One column at each place."""
+        found = np.empty(len(xi))
+        cell, local = located(xi, self.cut)
         for k in np.unique(cell):
             found[cell == k] = self.cells[k].each(local[cell == k], columns[cell == k])
         return found
 
 
-def located(germs: Array, cut: int) -> tuple[IntArray, Array]:
-    """The cell of every germ, (places,), and where in it, from -1 to 1 along each axis."""
-    along = np.clip(np.floor(0.5 * cut * (germs + 1)).astype(np.int64), 0, cut - 1)
+def located(xi: Array, cut: int) -> tuple[IntArray, Array]:
+    """The cell of every place, (places,), and where in it, from -1 to 1 along each axis."""
+    along = np.clip(np.floor(0.5 * cut * (xi + 1)).astype(np.int64), 0, cut - 1)
     middle = (2 * along + 1) / cut - 1
-    return np.asarray(along @ cut ** np.arange(germs.shape[1])), np.asarray((germs - middle) * cut)
+    return np.asarray(along @ cut ** np.arange(xi.shape[1])), np.asarray((xi - middle) * cut)
 
 
 def taylor(study: Study) -> Plan:
@@ -78,7 +78,7 @@ def taylor(study: Study) -> Plan:
 def _series(study: Study, order: int, cut: int) -> Expansion | Pieces:
     """Raises ComputationError."""
     runs, parameters = study.runs, len(study.inputs)
-    cell, local = located(runs.germs, cut)
+    cell, local = located(runs.xi, cut)
     terms = total_degree(parameters, order)
     if len(np.unique(cell)) < cut**parameters:
         raise ComputationError(f"all runs of a subinterval failed: {runs.why}")

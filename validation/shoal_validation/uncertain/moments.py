@@ -77,12 +77,12 @@ def tried(form: Form) -> Met:
 def _moments(of: Function, marginal: Marginal) -> tuple[float, float]:
     """Mean and mean square of a function of one parameter."""
     if isinstance(marginal, Normal):
-        germs = np.linspace(-REACH, REACH, FINE + 1)
-        weights = stats.norm.pdf(germs)
+        xi = np.linspace(-REACH, REACH, FINE + 1)
+        weights = stats.norm.pdf(xi)
     else:
-        germs = marginal.germ((np.arange(FINE) + 0.5) / FINE)
+        xi = marginal.quantile((np.arange(FINE) + 0.5) / FINE)
         weights = np.ones(FINE)
-    told = of(marginal.value(germs))
+    told = of(marginal.value(xi))
     weights = weights / weights.sum()
     return float(weights @ told), float(weights @ told**2)
 

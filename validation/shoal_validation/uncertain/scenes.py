@@ -287,25 +287,25 @@ def attempted(asked: Asked, runs: int, seed: int) -> tuple[Array, Array, int]:
     failed = 0
     for k in range(max(1, runs // BLOCK)):
         if k < runs // (2 * BLOCK) or k == 0:
-            germs = random.uniform(-1, 1, (BLOCK, count))
-            germs = np.where(random.random(germs.shape) < (0.0, 0.3, 0.7)[k % 3], np.sign(germs), germs)
-            germs = np.vstack([corners, germs])[:BLOCK] if k == 0 else germs
+            xi = random.uniform(-1, 1, (BLOCK, count))
+            xi = np.where(random.random(xi.shape) < (0.0, 0.3, 0.7)[k % 3], np.sign(xi), xi)
+            xi = np.vstack([corners, xi])[:BLOCK] if k == 0 else xi
         else:
             size = 10.0 ** random.uniform(-4, -0.5, (BLOCK, 1))
-            germs = at[random.integers(0, len(at), BLOCK)] + size * random.uniform(-1, 1, (BLOCK, count))
-            germs = np.clip(germs, -1, 1)
-        values = ends.mean(axis=1) + germs * np.diff(ends, axis=1)[:, 0] / 2
+            xi = at[random.integers(0, len(at), BLOCK)] + size * random.uniform(-1, 1, (BLOCK, count))
+            xi = np.clip(xi, -1, 1)
+        values = ends.mean(axis=1) + xi * np.diff(ends, axis=1)[:, 0] / 2
         motion = engine.simulate_many(scene, dict(zip(asked.vary, values.T, strict=True)), times)
         good = np.array([status is Status.OK for status in motion.status])
         failed += int((~good).sum())
         told = np.concatenate([motion.points, motion.angles[:, :, None]], axis=2)
         told = np.moveaxis(told, -1, 0).reshape(motion.lanes, -1)[good]
-        germs = germs[good]
+        xi = xi[good]
         if k == 0:
             low, high = told.min(axis=0), told.max(axis=0)
-            at = np.concatenate([germs[told.argmin(axis=0)], germs[told.argmax(axis=0)]])
+            at = np.concatenate([xi[told.argmin(axis=0)], xi[told.argmax(axis=0)]])
         for side, better in enumerate((told.min(axis=0) < low, told.max(axis=0) > high)):
-            best = germs[(told.argmin(axis=0), told.argmax(axis=0))[side]]
+            best = xi[(told.argmin(axis=0), told.argmax(axis=0))[side]]
             half = slice(side * len(low), (side + 1) * len(low))
             at[half] = np.where(better[:, None], best, at[half])
         low, high = np.minimum(low, told.min(axis=0)), np.maximum(high, told.max(axis=0))

@@ -188,21 +188,21 @@ def attempted(asked: Drawn, runs: int) -> tuple[Array, Array]:
     blocks = max(1, runs // BLOCK)
     for k in range(blocks):
         if k < 2 * blocks // 3 or k == 0:
-            germs = random.uniform(-1, 1, (BLOCK, len(inputs)))
-            germs = np.where(random.random(germs.shape) < (0.0, 0.3, 0.7)[k % 3], np.sign(germs), germs)
+            xi = random.uniform(-1, 1, (BLOCK, len(inputs)))
+            xi = np.where(random.random(xi.shape) < (0.0, 0.3, 0.7)[k % 3], np.sign(xi), xi)
         else:
             best = np.concatenate(at)
             size = 10.0 ** random.uniform(-4, -0.5, (BLOCK, 1))
-            germs = best[random.integers(0, len(best), BLOCK)] + size * random.uniform(-1, 1, (BLOCK, len(inputs)))
-            germs = np.clip(germs, -1, 1)
-        found = asked.motion(inputs.values(germs), asked.times)
+            xi = best[random.integers(0, len(best), BLOCK)] + size * random.uniform(-1, 1, (BLOCK, len(inputs)))
+            xi = np.clip(xi, -1, 1)
+        found = asked.motion(inputs.values(xi), asked.times)
         # A closed form may not reach a singular place, such as a pendulum that stands upright.
         finite = np.isfinite(found).all(axis=1)
-        germs, found = germs[finite], found[finite]
+        xi, found = xi[finite], found[finite]
         for side, sign in enumerate((1, -1)):
             least = np.argmin(sign * found, axis=0)
             value = found[least, np.arange(len(low))]
             better = sign * value < sign * (low, high)[side]
-            at[side][better] = germs[least][better]
+            at[side][better] = xi[least][better]
         low, high = np.minimum(low, found.min(axis=0)), np.maximum(high, found.max(axis=0))
     return low, high

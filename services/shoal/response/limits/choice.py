@@ -71,12 +71,12 @@ def form(margins: Margins, seed: int) -> Exceedance:
         none = kinds.NO_DESIGN_POINT.found("FORM found no place where the limit is exceeded")
         return Exceedance(_nothing("no design point"), [], "FORM", [none])
     instants = margins(np.zeros((1, parameters))).shape[1]
-    passed = np.where(np.arange(instants) >= points[0].instant, points[0].probability, 0.0)
+    exceeded = np.where(np.arange(instants) >= points[0].instant, points[0].probability, 0.0)
     found = [] if points[0].converged else [kinds.FORM_NOT_CONVERGED.found("FORM did not converge")]
     if len(points) > 1:
         text = f"{len(points)} design points were found and FORM takes the nearest only"
         found.append(kinds.SEVERAL_DESIGN_POINTS.found(text, points=len(points)))
-    estimate = ExceedanceEstimate(passed, np.full(instants, np.nan), "FORM")
+    estimate = ExceedanceEstimate(exceeded, np.full(instants, np.nan), "FORM")
     return Exceedance(estimate, points, "FORM: first-order estimate", found)
 
 
@@ -87,7 +87,7 @@ def by_importance(margins: Margins, seed: int) -> Exceedance:
         none = kinds.NO_DESIGN_POINT.found("no design point was found to sample at")
         return Exceedance(_nothing("no design point"), [], "importance sampling", [none])
     found = sample(margins, adapted(points, []), margins.left, seed + 1)
-    why = f"{found.estimate.why} around {_told(points)}"
+    why = f"{found.estimate.why} around {_describe(points)}"
     return Exceedance(found.estimate, points, why, _weak(found.estimate, [found], points, ended=True), sample=found)
 
 
@@ -142,7 +142,7 @@ def auto(margins: Margins, seed: int) -> Exceedance:
         *_disagree(estimate, "importance sampling", first.estimate, 0.0, "its first runs", both=True),
         *_disagree(estimate, "importance sampling", rough, LEAST, "subset simulation"),
     ]
-    why = f"{estimate.why} around {_told(searched.points)}; {rough.why} says {rough.probability:.1e}"
+    why = f"{estimate.why} around {_describe(searched.points)}; {rough.why} says {rough.probability:.1e}"
     return Exceedance(estimate, searched.points, why, findings, len(rows), last)
 
 
@@ -168,16 +168,16 @@ def _search(margins: Margins, pilot: Levels, known: list[DesignPoint], seed: int
     """
     parameters, whole = len(margins.inputs), margins.most
     samples = [Sample(pilot.places, pilot.margins, np.ones(len(pilot.places)))] if len(pilot.places) else []
-    foretold, surface = list[DesignPoint](), fit_surface(margins.inputs, *margins.known)
+    predicted, surface = list[DesignPoint](), fit_surface(margins.inputs, *margins.known)
     fair = surface is not None and surface.error <= FAIR
     if surface is not None:
         free, axes = surface.margins, STARTED * np.eye(parameters)
         many = subset(free, MANY, seed)
-        foretold = design_points(free, np.vstack([np.zeros((1, parameters)), axes, -axes, _apart(many.places)]))
+        predicted = design_points(free, np.vstack([np.zeros((1, parameters)), axes, -axes, _apart(many.places)]))
         if len(many.places):
             samples.insert(0 if fair else 1, Sample(many.places, many.margins, np.ones(len(many.places))))
     margins.most = margins.evaluations + int((FOR_POINTS if fair else MORE_POINTS) * margins.left)
-    points, starts, ended = known, _fresh(foretold[:STARTS], known, parameters), False
+    points, starts, ended = known, _fresh(predicted[:STARTS], known, parameters), False
     if not fair:
         starts = np.zeros((0, parameters))
         if not known:
@@ -192,7 +192,7 @@ def _search(margins: Margins, pilot: Levels, known: list[DesignPoint], seed: int
         places, rows = margins.known
         # What a surface makes of places where no run has been is not known.
         hidden = places[least(rows) < 0] if pilot.places.size else np.zeros((1 - bool(points), parameters))
-        for point in (*points, *(foretold if fair else ())):
+        for point in (*points, *(predicted if fair else ())):
             hidden = hidden[hidden @ point.normal < point.beta]
         starts = np.concatenate([starts, _apart(hidden)])
         ended = not len(starts)
@@ -205,7 +205,7 @@ def _search(margins: Margins, pilot: Levels, known: list[DesignPoint], seed: int
         points, starts = more, starts[:0]
     margins.most = whole
     points = points or [_where(place) for place in _apart(pilot.places)]
-    proposed = distinct([*points, *foretold])[: STARTS + 2 * parameters] if fair else points
+    proposed = distinct([*points, *predicted])[: STARTS + 2 * parameters] if fair else points
     return Searched(points, proposed, samples, surface, ended or fair)
 
 
@@ -271,7 +271,7 @@ def _nothing(why: str) -> ExceedanceEstimate:
     return ExceedanceEstimate(np.array([np.nan]), np.array([np.nan]), why, unseen=1.0)
 
 
-def _told(points: list[DesignPoint]) -> str:
+def _describe(points: list[DesignPoint]) -> str:
     betas = ", ".join(f"{point.beta:.2f}" for point in points[:3]) + (", ..." if len(points) > 3 else "")
     what = "a design point" if len(points) == 1 else f"{len(points)} design points"
     return f"{what} (beta {betas})"
@@ -283,7 +283,7 @@ def _weak(
     """Return why runs around design points do not give the probability. ended: whether the search for these did."""
     sure, runs = [point for point in points if point.converged], len(samples[0].rows)
     if not estimate.probability and sure:
-        text = f"there is {_told(sure)}, but none of {runs} runs around it exceeds the limit"
+        text = f"there is {_describe(sure)}, but none of {runs} runs around it exceeds the limit"
         return [kinds.NONE_EXCEEDS.found(text, runs=runs)]
     found, seen = list[Finding](), 0
     for rows, probability in itertools.chain.from_iterable(one.outside for one in samples):
@@ -296,7 +296,7 @@ def _weak(
 
 
 def _disagree(
-    one: ExceedanceEstimate, name: str, other: ExceedanceEstimate, least: float, told: str, *, both: bool = False
+    one: ExceedanceEstimate, name: str, other: ExceedanceEstimate, least: float, source: str, *, both: bool = False
 ) -> list[Finding]:
     """Return a finding where an independent estimate is larger (or, for `both`, smaller) than chance allows.
 
@@ -308,5 +308,5 @@ def _disagree(
     away = math.log(other.probability / one.probability) if one.probability else math.inf
     if away <= chance and not (both and -away > chance):
         return []
-    text = f"{name} says {one.probability:.1e} and {told} {other.probability:.1e}"
+    text = f"{name} says {one.probability:.1e} and {source} {other.probability:.1e}"
     return [kinds.ESTIMATES_DIFFER.found(text, probability=one.probability, other=other.probability)]

@@ -23,7 +23,7 @@ class ExceedanceEstimate:
     of the probability that more instants would add, nan where it is not known; why: in words
     """
 
-    passed: Array
+    exceeded: Array
     deviation: Array
     why: str
     unseen: float = 0.0
@@ -33,7 +33,7 @@ class ExceedanceEstimate:
     @property
     def probability(self) -> float:
         """Over all instants."""
-        return float(self.passed[-1])
+        return float(self.exceeded[-1])
 
     @property
     def coefficient(self) -> float:
@@ -41,7 +41,7 @@ class ExceedanceEstimate:
         return float(self.deviation[-1])
 
     @property
-    def told(self) -> str:
+    def described(self) -> str:
         """The probability in words: where no run has passed the limit, not 0 but what it is below."""
         if self.probability == 0:
             return f"below {float(self.interval[1][-1]):.2g}"
@@ -51,8 +51,8 @@ class ExceedanceEstimate:
     def interval(self) -> tuple[Array, Array]:
         """Bounds that hold with 95 % confidence, (instants,) each: of a lognormal variable."""
         with np.errstate(invalid="ignore", over="ignore"):
-            lower = np.where(self.passed > 0, self.passed * np.exp(-CONFIDENCE * self.deviation), 0.0)
-            upper = np.where(self.passed > 0, self.passed * np.exp(CONFIDENCE * self.deviation), self.unseen)
+            lower = np.where(self.exceeded > 0, self.exceeded * np.exp(-CONFIDENCE * self.deviation), 0.0)
+            upper = np.where(self.exceeded > 0, self.exceeded * np.exp(CONFIDENCE * self.deviation), self.unseen)
         return lower, np.minimum(upper + self.failed, 1.0)
 
 
@@ -67,16 +67,16 @@ def weighted(margins: Array, weights: Array, why: str) -> ExceedanceEstimate:
     count, instants = margins.shape
     first = first_passages(margins)
     beyond = first < instants
-    passed = np.cumsum(np.bincount(first[beyond], weights[beyond], instants)) / count
+    exceeded = np.cumsum(np.bincount(first[beyond], weights[beyond], instants)) / count
     squares = np.cumsum(np.bincount(first[beyond], weights[beyond] ** 2, instants)) / count
-    variance = np.maximum(squares - passed**2, 0.0) / max(count - 1, 1)
-    deviation = np.divide(np.sqrt(variance), passed, out=np.full(instants, np.inf), where=passed > 0)
+    variance = np.maximum(squares - exceeded**2, 0.0) / max(count - 1, 1)
+    deviation = np.divide(np.sqrt(variance), exceeded, out=np.full(instants, np.inf), where=exceeded > 0)
     # Where all of n runs pass, more than 1 - 3.7 / n do with 97.5 % confidence.
     deviation = np.maximum(deviation, -math.log(0.025) / (CONFIDENCE * count))
     lost = float(weights[np.isnan(margins).any(axis=1)].sum() / count)
     # No event in n runs: less than 3.7 / n with 97.5 % confidence.
     unseen = 1 - 0.025 ** (1 / count)
-    return ExceedanceEstimate(passed, deviation, why, unseen, lost, _between(margins, weights))
+    return ExceedanceEstimate(exceeded, deviation, why, unseen, lost, _between(margins, weights))
 
 
 def _between(margins: Array, weights: Array) -> float:

@@ -86,8 +86,8 @@ def design_points(margins: Margins, starts: Array) -> list[DesignPoint]:
             meet(u, active)
     except TooManyRunsError:
         pass
-    reached = active & np.any(slopes, axis=1) & (g <= NEAR * np.linalg.norm(slopes, axis=1))
-    return distinct([_point(u[k], slopes[k], rows[k], bool(straight[k])) for k in np.flatnonzero(reached)])
+    near = active & np.any(slopes, axis=1) & (g <= NEAR * np.linalg.norm(slopes, axis=1))
+    return distinct([_point(u[k], slopes[k], rows[k], bool(straight[k])) for k in np.flatnonzero(near)])
 
 
 def gradients(margins: Margins, u: Array, rows: Array) -> Array:

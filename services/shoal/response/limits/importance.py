@@ -191,8 +191,10 @@ class Sample:
 
     def shifted(self, off: Array) -> tuple[float, float, float]:
         """Return the probability if all margins were larger by `off`, (instants,), as they are, and if smaller."""
-        told = (float(self.weights[least(self.rows + by) < 0].sum() / len(self.weights)) for by in (off, 0 * off, -off))
-        fewer, same, more = (min(one, 1.0) for one in told)
+        chances_of = (
+            float(self.weights[least(self.rows + by) < 0].sum() / len(self.weights)) for by in (off, 0 * off, -off)
+        )
+        fewer, same, more = (min(one, 1.0) for one in chances_of)
         return fewer, same, more
 
     @property
@@ -220,32 +222,32 @@ def controlled(found: Sample, proposal: Mixture, chances: Callable[[Array], Arra
     """
     estimate, count = found.estimate, len(found.weights)
     beyond = found.weights * (found.rows < 0).any(axis=1)
-    foretold = found.weights * chances(found.places)
-    if not beyond.any() or not foretold.any():
+    predicted = found.weights * chances(found.places)
+    if not beyond.any() or not predicted.any():
         return estimate
     places, _ = proposal.draw(FREE * count, np.random.default_rng(seed))
     many = chances(places)
     some = many > 0
     many[some] *= proposal.weights(places[some])
     known = many.var() / len(many)
-    covariance = np.cov(beyond, foretold) / count
+    covariance = np.cov(beyond, predicted) / count
     share = covariance[0, 1] / (covariance[1, 1] + known)
-    probability = float(beyond.mean() - share * (foretold.mean() - many.mean()))
-    variance = float((beyond - share * foretold).var(ddof=1)) / count + share**2 * known
+    probability = float(beyond.mean() - share * (predicted.mean() - many.mean()))
+    variance = float((beyond - share * predicted).var(ddof=1)) / count + share**2 * known
     if probability <= 0 or variance >= float(covariance[0, 0]):
         return estimate
     deviation = max(math.sqrt(variance) / probability, SURE / np.count_nonzero(beyond))
     # Which part of it is passed up to an instant, the runs alone tell: the variance of a ratio.
-    instants, part = found.rows.shape[1], estimate.passed / estimate.probability
+    instants, part = found.rows.shape[1], estimate.exceeded / estimate.probability
     first = first_passages(found.rows)
     inside = first < instants
     squares = np.cumsum(np.bincount(first[inside], found.weights[inside] ** 2, instants))
     scatter = (1 - part) ** 2 * squares + part**2 * (squares[-1] - squares)
-    size = (count * estimate.passed) ** 2
+    size = (count * estimate.exceeded) ** 2
     among = np.divide(scatter, size, out=np.full(instants, np.inf), where=size > 0)
-    passed = np.minimum(estimate.passed * (probability / estimate.probability), 1.0)
+    exceeded = np.minimum(estimate.exceeded * (probability / estimate.probability), 1.0)
     why = f"{estimate.why}, with a response surface as control variate,"
-    return replace(estimate, passed=passed, deviation=np.sqrt(among + deviation**2), why=why)
+    return replace(estimate, exceeded=exceeded, deviation=np.sqrt(among + deviation**2), why=why)
 
 
 def adapted(points: list[DesignPoint], found: Sequence[Sample], judge: Sample | None = None) -> Mixture:

@@ -29,7 +29,7 @@ CLOSER = 3
 """and so often at most, each time between the two where it may come nearest, such as where a quantity changes sign."""
 Reach = Callable[[Model, float], tuple[Array, Array, Array, int, int]]
 """Of the margins of a model over time, from a bound of some size: the least that runs attain, that may be, (instants,);
-the germs of the former, (instants, parameters); runs made, and how many failed."""
+the standardised variables of the former, (instants, parameters); runs made, and how many failed."""
 
 
 @dataclass(frozen=True)
@@ -46,26 +46,25 @@ class MarginWatch:
 
 def watched(machine: ResponseModel, limit: Limit) -> ResponseModel:
     """Return the machine with the margins of a limit as its answers."""
-    told = MarginWatch(limit, len(machine.times)).margins
     return replace(
         machine,
         scene=limit.scene(machine.scene),
         times=limit.instants(machine.times),
         engine=limit.engine(machine.engine, machine.scene),
-        told=told,
+        reduce=MarginWatch(limit, len(machine.times)).margins,
     )
 
 
 def require(machine: ResponseModel, limit: Limit, inputs: Inputs) -> None:
     """Check by a run in the middle that the machine gives the quantity of a limit. Raises InputError."""
     if limit.is_dynamic:
-        middle = inputs.values(inputs.germs(np.full((1, len(inputs)), 0.5)))
+        middle = inputs.values(inputs.quantiles(np.full((1, len(inputs)), 0.5)))
         watched(replace(machine, keep=None), limit)(middle)
 
 
-def _show(limit: Limit, machine: ResponseModel, inputs: Inputs, germ: Array, verify: bool) -> VerifiedRun:
-    """Run the machine once more at a germ; a run that is refused costs the other answers nothing and is a doubt."""
-    named = inputs.named(germ[None])[0]
+def _show(limit: Limit, machine: ResponseModel, inputs: Inputs, xi: Array, verify: bool) -> VerifiedRun:
+    """Run the machine once more at xi; a run that is refused costs the other answers nothing and is a doubt."""
+    named = inputs.named(xi[None])[0]
     try:
         return _run_shown(limit, machine, inputs, named, verify)
     except (InputError, ComputationError) as error:
@@ -101,24 +100,24 @@ def judge(
     probability. Raises InputError, ComputationError.
     """
     get_way(way)
-    told, times = watched(machine, limit), machine.times
+    model, times = watched(machine, limit), machine.times
     if inputs.random.all():
-        margins = Margins(told, inputs, most, progress)
-        passing = probability(margins, way, seed)
+        margins = Margins(model, inputs, most, progress)
+        exceedance = probability(margins, way, seed)
         shown, shifted = None, None
-        if passing.shown is not None:
-            shown = _show(limit, machine, inputs, inputs.standard(passing.shown[None])[0], verify)
-        if passing.sample is not None and shown is not None and shown.errors is not None:
-            shifted = passing.sample.shifted(shown.errors.over_time)
-        nan, passing = float("nan"), replace(passing, sample=None)  # which takes much room
+        if exceedance.shown is not None:
+            shown = _show(limit, machine, inputs, inputs.standard(exceedance.shown[None])[0], verify)
+        if exceedance.sample is not None and shown is not None and shown.errors is not None:
+            shifted = exceedance.sample.shifted(shown.errors.over_time)
+        nan, exceedance = float("nan"), replace(exceedance, sample=None)  # which takes much room
         return LimitResult(
-            *(limit, way, inputs, times, passing, None, nan, nan),
+            *(limit, way, inputs, times, exceedance, None, nan, nan),
             *(shown, margins.evaluations, margins.failed, margins.why),
             shifted=shifted,
         )
-    lower, outer, germs, evaluations, failed = reach(told, abs(limit.bound))
+    lower, outer, xi, evaluations, failed = reach(model, abs(limit.bound))
     worst = int(lower.argmin())
-    shown = _show(limit, machine, inputs, germs[worst], verify)
+    shown = _show(limit, machine, inputs, xi[worst], verify)
     off = np.zeros(1) if shown.errors is None else shown.errors.over_time
     kept = _decided(lower + off, outer - off)
     hidden = kept is None and _decided(lower, outer) is not None
@@ -149,8 +148,8 @@ def _between(limit: Limit, machine: ResponseModel, shown: VerifiedRun) -> float 
         if not motion.ok:
             return None
         margins = MarginWatch(limit, len(when)).margins(motion, scene, {})[0]
-        if (passed := margins < 0).any():
-            return float(when[passed.argmax()])
+        if (beyond := margins < 0).any():
+            return float(when[beyond.argmax()])
         steps = np.abs(np.diff(margins))
         # As steep as beside it, the margin may go down so far before the next instant.
         within = margins - np.maximum(np.append(steps, 0.0), np.append(0.0, steps))

@@ -172,11 +172,11 @@ def quantity_over_time(
     values: of the lanes by path
     """
     found = np.full((len(motion.times), motion.lanes), np.nan)
-    told = _by_states if needs_states(quantity, scene) else _by_course
+    each_lane = _by_states if needs_states(quantity, scene) else _by_course
     # A model of all lanes tells places and accelerations in each, and forces of parts in the first only.
-    alone = quantity not in STRAINS and not (told is _by_course and quantity in ENERGIES)
+    alone = quantity not in STRAINS and not (each_lane is _by_course and quantity in ENERGIES)
     alone = alone or scene.alone(values) is not None
-    for lane, one in told(motion, scene, values, quantity, alone):
+    for lane, one in each_lane(motion, scene, values, quantity, alone):
         found[:, lane] = _of_lane(one, quantity, place)
     return found
 

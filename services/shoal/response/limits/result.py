@@ -94,12 +94,12 @@ class ProbabilityBounds:
         """Plain data."""
         sides = {}
         for name, one, at in (("lower", self.lower, self.at_lower), ("upper", self.upper, self.at_upper)):
-            told = {
+            data = {
                 key: value
                 for key, value in one.to_json().items()
                 if key not in ("limit", "require", "stated", "unit", "method")
             }
-            sides[f"at_{name}"] = {"parameters": at, **told}
+            sides[f"at_{name}"] = {"parameters": at, **data}
         (least, largest), (lower, upper), (lower_outer, upper_outer) = self.estimates, self.interval, self.outer
         return {
             "probability_lower": least,
@@ -139,7 +139,7 @@ class LimitResult:
     way: str
     inputs: Inputs
     times: Array
-    passing: Exceedance | None
+    exceedance: Exceedance | None
     kept: bool | None
     margin: float
     outer: float
@@ -161,7 +161,7 @@ class LimitResult:
     def estimates(self) -> list[ExceedanceEstimate]:
         """Probabilities over time: one, or the least and the largest over intervals, none where all are intervals."""
         every = [self] if self.between is None else [self.between.lower, self.between.upper]
-        return [one.passing.estimate for one in every if one.passing is not None]
+        return [one.exceedance.estimate for one in every if one.exceedance is not None]
 
     @property
     def findings(self) -> list[Finding]:
@@ -183,7 +183,7 @@ class LimitResult:
         """Reasons for doubt."""
         if self.between is not None:
             return self.between.findings
-        return [*(self._undecided if self.passing is None else self._doubtful(self.passing)), *self._runs]
+        return [*(self._undecided if self.exceedance is None else self._doubtful(self.exceedance)), *self._runs]
 
     @property
     def _undecided(self) -> list[Finding]:
@@ -196,9 +196,9 @@ class LimitResult:
         numbers = {"margin": self.margin, "error": self.errors.total or 0.0}
         return [kinds.WITHIN_ERROR.found(f"{least}, and their known error {self.errors}", **numbers)]
 
-    def _doubtful(self, passing: Exceedance) -> list[Finding]:
+    def _doubtful(self, exceedance: Exceedance) -> list[Finding]:
         """Reasons to doubt a probability: of its method, and the error of the model."""
-        found, moved = list(passing.findings), self.moved
+        found, moved = list(exceedance.findings), self.moved
         if self.errors.unknown:
             text = f"the error of the model is not known ({', '.join(self.errors.unknown)})"
             found.append(kinds.ERROR_UNKNOWN.found(text))
@@ -244,16 +244,16 @@ class LimitResult:
         }
         if self.between is not None:
             found |= self.between.to_json()
-        elif self.passing is not None:
-            found |= self._probability(self.passing)
+        elif self.exceedance is not None:
+            found |= self._probability(self.exceedance)
         else:
             found |= {"kept": self.kept, "margin": self.margin, "margin_outer": self.outer}
         found |= {"evaluations": self.evaluations, "failed": self.failed, "doubt": message(self.reasons)}
         found |= {"findings": [one.to_json() for one in self.findings]}
         return dict(plain({**found, "shown_by": None if self.shown is None else self.shown.to_json()}))
 
-    def _probability(self, passing: Exceedance) -> dict[str, Any]:
-        estimate = passing.estimate
+    def _probability(self, exceedance: Exceedance) -> dict[str, Any]:
+        estimate = exceedance.estimate
         lower, upper = estimate.interval
         points = [
             {
@@ -264,7 +264,7 @@ class LimitResult:
                 "sensitivity": dict(zip(self.inputs.names, (point.normal**2).tolist(), strict=True)),
                 "converged": point.converged,
             }
-            for point in passing.points
+            for point in exceedance.points
         ]
         return {
             "probability": estimate.probability,
@@ -272,12 +272,12 @@ class LimitResult:
             "upper": self.interval[1],
             "confidence": 0.95,
             "coefficient_of_variation": estimate.coefficient,
-            "unseen": unseen(passing.plain) if passing.plain else None,
+            "unseen": unseen(exceedance.plain) if exceedance.plain else None,
             "between_instants": estimate.between,
             "beta": float(-special.ndtri(estimate.probability)),
-            "why": passing.why,
+            "why": exceedance.why,
             "design_points": points,
-            "first_passage": {"t": self.times, "probability": estimate.passed, "lower": lower, "upper": upper},
+            "first_passage": {"t": self.times, "probability": estimate.exceeded, "lower": lower, "upper": upper},
             "probability_with_errors": None if not self.moved else list(self._with_errors(estimate.probability)),
         }
 
@@ -291,7 +291,7 @@ class LimitResult:
 
         To first order at a design point; where there is none, counted in runs.
         """
-        if self.passing is None or self.shown is None or self.shown.errors is None:
+        if self.exceedance is None or self.shown is None or self.shown.errors is None:
             return 0.0
         if self._point is not None:
             return float(self.shown.errors.over_time[self._point.instant] / self._point.slope)
@@ -305,7 +305,7 @@ class LimitResult:
     @property
     def _point(self) -> DesignPoint | None:
         """The design point, None where none was found."""
-        points = [] if self.passing is None else self.passing.points
+        points = [] if self.exceedance is None else self.exceedance.points
         return points[0] if points and points[0].converged else None
 
     @property

@@ -176,6 +176,6 @@ def _fit(basis: Array, margin: Array) -> tuple[Array, float]:
     size = np.maximum(np.linalg.norm(weighted, axis=0), 1e-300)
     q, r = np.linalg.qr(np.concatenate([weighted / size, RIDGE * np.eye(len(size))]))
     q = q[: len(margin)]
-    told = q.T @ (root * margin)
-    left = (root * margin - q @ told) / np.maximum(1 - (q**2).sum(axis=1), 1e-3)
-    return np.linalg.solve(r, told) / size, float(np.sqrt(np.sum((root * left) ** 2) / np.sum(root**4)))
+    projected = q.T @ (root * margin)
+    left = (root * margin - q @ projected) / np.maximum(1 - (q**2).sum(axis=1), 1e-3)
+    return np.linalg.solve(r, projected) / size, float(np.sqrt(np.sum((root * left) ** 2) / np.sum(root**4)))

@@ -13,13 +13,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shoal.response.design import Screened, box_design, screened
-from shoal.response.enclosure import contradicts, control_misses, enclosure, looked_at, with_controls
+from shoal.response.enclosure import contradicts, control_misses, enclose, enclosure, with_controls
 from shoal.response.expansion import Expansion, fit
 from shoal.response.extremes import Extremes, extremes
 from shoal.response.polynomials import HIGHEST
 from shoal.response.regularised import Decay, likeliest, regularised, trimmed
 from shoal.response.runs import TooManyRunsError
-from shoal.response.study import FINE_GAP, Found, Looked, Study
+from shoal.response.study import FINE_GAP, DatedEnclosure, Found, Study
 from shoal.trajectory import Array
 
 SHARE = 1.25
@@ -59,7 +59,7 @@ class StudyState:
     error: Array
     gap: Array
     found: int
-    looked: Looked | None = None
+    enclosed: DatedEnclosure | None = None
     decay: Decay | None = None
 
 
@@ -69,19 +69,19 @@ def bounds(study: Study) -> Found:
     unit = np.eye(parameters)
     runs(np.vstack([np.zeros((1, parameters)), unit, -unit]))
     plan = screened(study)
-    _run_signs(plan, _foretold(plan, 1))
+    _run_signs(plan, _fit_columns(plan, 1))
     here, degree = _grown(plan, _round(plan, 1), 1)
     with suppress(TooManyRunsError):
         missed = control_misses(study, here.surrogate)
         surprising = contradicts(study, missed, here.error) & (study.instants < horizon(study, here.gap))
-        here = replace(here, looked=with_controls(study, here.looked))
+        here = replace(here, enclosed=with_controls(study, here.enclosed))
         if surprising.any():
-            here = replace(here, error=study.beside(np.maximum(here.error, missed)), looked=None)
+            here = replace(here, error=study.beside(np.maximum(here.error, missed)), enclosed=None)
             here, _ = _grown(plan, _round(plan, degree, here.decay), degree)
     top = int(here.surrogate.terms.sum(axis=1).max())
-    kind = "regularised " if len(here.surrogate.terms) > len(runs.germs) / SHARE else ""
+    kind = "regularised " if len(here.surrogate.terms) > len(runs.xi) / SHARE else ""
     why = f"{kind}polynomials of total degree {top}; their extremal points are run and entered into the fit{plan.why}"
-    return Found(why, here.surrogate, here.error, looked=here.looked)
+    return Found(why, here.surrogate, here.error, enclosed=here.enclosed)
 
 
 def _grown(plan: Screened, here: StudyState, degree: int) -> tuple[StudyState, int]:
@@ -99,7 +99,7 @@ def _grown(plan: Screened, here: StudyState, degree: int) -> tuple[StudyState, i
 def _next(plan: Screened, degree: int) -> int:
     """The degree that the runs there are carry, after some for one more at least. Raises TooManyRunsError."""
     study = plan.study
-    made = len(study.runs.germs)
+    made = len(study.runs.xi)
     wanted = degree + 1
     while SHARE * plan.size(wanted + 1) <= made and wanted - degree < 3:
         wanted += 1
@@ -111,21 +111,21 @@ def _next(plan: Screened, degree: int) -> int:
         missing = min(missing, plan.fair - made - max(1, plan.fair // SPARED))
     if missing > 0:
         terms = plan.terms(wanted)
-        study.runs(box_design(study.inputs, study.runs.germs, terms, missing, study.seed + wanted))
+        study.runs(box_design(study.inputs, study.runs.xi, terms, missing, study.seed + wanted))
     return wanted if _carried(plan, wanted) else degree
 
 
 def _carried(plan: Screened, degree: int) -> bool:
     """Return whether the good runs there are carry that degree."""
-    return len(plan.study.runs.germs) >= SHARE * plan.size(degree)
+    return len(plan.study.runs.xi) >= SHARE * plan.size(degree)
 
 
-def _foretold(plan: Screened, degree: int) -> Expansion:
+def _fit_columns(plan: Screened, degree: int) -> Expansion:
     """Every column by this degree, or by a lower one where that foretells much better what is left out of its fit."""
     inputs, runs = plan.study.inputs, plan.study.runs
-    best = fit(inputs, runs.germs, runs.values, plan.terms(degree))
+    best = fit(inputs, runs.xi, runs.values, plan.terms(degree))
     for lower in range(degree - 1, 0, -1):
-        other = fit(inputs, runs.germs, runs.values, plan.terms(lower))
+        other = fit(inputs, runs.xi, runs.values, plan.terms(lower))
         better = (other.left_out < CLEARLY * best.left_out) | (not best.whole)
         if better.any():
             fewer = np.zeros_like(best.coefficients)
@@ -146,7 +146,7 @@ def _falling(plan: Screened, found: Expansion, degree: int, before: Decay | None
     coarse = (widths > 0) & (np.ptp(runs.values, axis=0) > 0) & (found.left_out > least * widths)
     missed = np.where(coarse, found.left_out, -1.0)
     worst = [int(np.where(study.groups == group, missed, -1.0).argmax()) for group in np.unique(study.groups[coarse])]
-    return likeliest(study.inputs, runs.germs, runs.values[:, worst], before) if worst else None
+    return likeliest(study.inputs, runs.xi, runs.values[:, worst], before) if worst else None
 
 
 def _with_more_terms(plan: Screened, found: Expansion, decay: Decay | None) -> Expansion:
@@ -154,7 +154,7 @@ def _with_more_terms(plan: Screened, found: Expansion, decay: Decay | None) -> E
     if decay is None:
         return found
     runs = plan.study.runs
-    other = regularised(plan.study.inputs, runs.germs, runs.values, decay)
+    other = regularised(plan.study.inputs, runs.xi, runs.values, decay)
     better = CLEARLY * other.left_out < found.left_out
     return trimmed(other.where(better, found)) if better.any() else found
 
@@ -176,31 +176,31 @@ def _run_signs(plan: Screened, linear: Expansion) -> None:
 def _round(plan: Screened, degree: int, before: Decay | None = None) -> StudyState:
     """Fit, find the extremal points, run those that promise most, fit again."""
     study, runs, parameters = plan.study, plan.study.runs, len(plan.study.inputs)
-    surrogate, columns = _foretold(plan, degree), runs.values.shape[1]
+    surrogate, columns = _fit_columns(plan, degree), runs.values.shape[1]
     decay = _falling(plan, surrogate, degree, before)
     surrogate = _with_more_terms(plan, surrogate, decay)
     found = extremes(surrogate, parameters, columns, study.seed + degree, rough=True, known=runs.attaining)
     new = _promising(plan, surrogate, found)
-    made = len(runs.germs)
+    made = len(runs.xi)
     if runs(new) == 0:
         # Nothing new is foretold: a few places tell whether that can be believed.
         runs(study.inputs.sobol(parameters + 1, study.seed + 1, runs.evaluations))
-    error = np.abs(surrogate(runs.germs[made:]) - runs.values[made:]).max(axis=0, initial=0.0)
+    error = np.abs(surrogate(runs.xi[made:]) - runs.values[made:]).max(axis=0, initial=0.0)
     # New runs lie where the polynomial is known best; those left out of the fit lie everywhere.
     error = study.beside(np.maximum(error, surrogate.left_out))
     if _carried(plan, degree):
         # What the new runs tell makes the polynomial better; its error is what it was without them.
-        surrogate = _with_more_terms(plan, _foretold(plan, degree), decay)
+        surrogate = _with_more_terms(plan, _fit_columns(plan, degree), decay)
     # What shows at once that a study is not done saves the rest, unless the horizon is looked for.
-    looked = None
+    enclosed = None
     gap = enclosure(study, surrogate, found, error, look="there").gap
     if gap.max() <= _enough(plan) or _late(plan):
         gap = enclosure(study, surrogate, found, error, look="scanned").gap
     if gap.max() <= _enough(plan):
         # If this ends the study it is the answer.
-        looked = looked_at(study, surrogate, error)
-        gap = looked.told.gap
-    return StudyState(surrogate, error, gap, len(new), looked, decay)
+        enclosed = enclose(study, surrogate, error)
+        gap = enclosed.enclosure.gap
+    return StudyState(surrogate, error, gap, len(new), enclosed, decay)
 
 
 def _promising(plan: Screened, surrogate: Expansion, found: Extremes) -> Array:
@@ -213,14 +213,14 @@ def _promising(plan: Screened, surrogate: Expansion, found: Extremes) -> Array:
     low, high = runs.values.min(axis=0), runs.values.max(axis=0)
     width = np.tile(study.widths(runs.values), 2)
     places = np.concatenate([found.at_lower, found.at_upper])
-    told = surrogate(places)
+    predicted = surrogate(places)
     most = max(2, plan.fair // ROUNDS)
     if runs.own < plan.fair:
         most = min(most, plan.fair - runs.own)
     names, varies = np.unique(study.groups), width > 0
     member = np.tile(study.groups, 2) == names[:, None]
     turns = dict.fromkeys(range(len(names)), 0)
-    known, chosen = runs.germs, list[Array]()
+    known, chosen = runs.xi, list[Array]()
     share: Array | None = None
     while len(chosen) < most:
         if share is None:
@@ -239,7 +239,7 @@ def _promising(plan: Screened, surrogate: Expansion, found: Extremes) -> Array:
         if np.min(np.max(np.abs(known - places[k]), axis=1)) > APART:
             chosen.append(places[k])
             known, share = np.vstack([known, places[k]]), None
-            low, high = np.minimum(low, told[k]), np.maximum(high, told[k])
+            low, high = np.minimum(low, predicted[k]), np.maximum(high, predicted[k])
     return np.array(chosen).reshape(-1, len(study.inputs))
 
 

@@ -55,28 +55,28 @@ def grown(study: Study, fair: int) -> Found:
         count = max(min(count, most, made + runs.left), min(least, made + runs.left))
         runs(inputs.sobol(count - made, study.seed, made))
         made = count
-        told = _told(study, more=made >= min(fair, made + runs.left) and not study.degree)
-        off = share(study, told.left_out)
+        chosen = _expanded(study, more=made >= min(fair, made + runs.left) and not study.degree)
+        off = share(study, chosen.left_out)
         most = MORE * fair if off > COARSE and made >= fair else fair
         if off < CONVERGED or made >= most or not runs.left:
             break
         count = 2 * made
-    found = told.plain
+    found = chosen.plain
     degree = int(found.terms.sum(axis=1).max(initial=0))
-    kind = "regularised " if len(found.terms) > len(runs.germs) / SHARE else ""
-    why = f"{kind}polynomial chaos of degree {degree} fitted to {len(runs.germs)} runs{told.why}"
-    errors = moment_errors(study, told, lambda part: told.again(part, _fitted, _chosen))
-    return Found(why, found, told.left_out, errors=errors, linked=told if told.links else None)
+    kind = "regularised " if len(found.terms) > len(runs.xi) / SHARE else ""
+    why = f"{kind}polynomial chaos of degree {degree} fitted to {len(runs.xi)} runs{chosen.why}"
+    errors = moment_errors(study, chosen, lambda part: chosen.again(part, _fitted, _chosen))
+    return Found(why, found, chosen.left_out, errors=errors, linked=chosen if chosen.links else None)
 
 
-def _told(study: Study, *, more: bool) -> Transformed:
+def _expanded(study: Study, *, more: bool) -> Transformed:
     """The expansion, with links where they are clearly better, and with more terms where it still misses something."""
     found = _chosen(study)
     wanted = shares(study, found.left_out) > CONVERGED
-    told = untransformed(found) if study.degree else transformed(study, found, wanted, _chosen)
+    chosen = untransformed(found) if study.degree else transformed(study, found, wanted, _chosen)
     if more:
-        told = compared(told, _with_more_terms(study, found, shares(study, told.left_out) <= CONVERGED))
-    return told
+        chosen = compared(chosen, _with_more_terms(study, found, shares(study, chosen.left_out) <= CONVERGED))
+    return chosen
 
 
 def _chosen(study: Study) -> Expansion:
@@ -91,7 +91,7 @@ def _fitted(study: Study) -> Expansion:
 
 def _reaching(study: Study, found: Expansion) -> Expansion:
     """With the error further out than runs tell."""
-    found = outwards(study.runs.germs, study.runs.values, found)
+    found = outwards(study.runs.xi, study.runs.values, found)
     return _with_hidden(found)
 
 
@@ -113,8 +113,8 @@ def _with_more_terms(study: Study, found: Expansion, good: BoolArray) -> Expansi
         if open_shares[worst] <= CONVERGED:
             break
         tried[worst] = True
-        decay = likeliest(inputs, runs.germs, runs.values[:, worst])
-        other = _with_hidden(regularised(inputs, runs.germs, runs.values, decay))
+        decay = likeliest(inputs, runs.xi, runs.values[:, worst])
+        other = _with_hidden(regularised(inputs, runs.xi, runs.values, decay))
         better = other.left_out < found.left_out
         if better.any():
             found = trimmed(other.where(better, found))

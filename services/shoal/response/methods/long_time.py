@@ -46,7 +46,7 @@ class Watch:
 
     times: evenly from 0 to beyond the last instant [s], (samples,); first: the run in the middle, (samples, signals);
     signal: the one with the most even cycles; uneven: how much a cycle differs from the next, as a share; turns: its
-    turning points; germs: of all runs that were watched, (runs, parameters); courses: of these runs
+    turning points; xi: of all runs that were watched, (runs, parameters); courses: of these runs
     """
 
     study: Study
@@ -55,15 +55,15 @@ class Watch:
     signal: int
     uneven: float
     turns: int
-    germs: list[Array]
+    xi: list[Array]
     courses: list[Array]
 
-    def follow(self, germs: Array) -> None:
-        """Watch runs at more germs. Raises as `watched` does."""
-        if not len(germs):
+    def follow(self, xi: Array) -> None:
+        """Watch runs at more places. Raises as `watched` does."""
+        if not len(xi):
             return
-        for germ, course in zip(germs, watched(self.study, germs, self.times), strict=True):
-            self.germs.append(germ)
+        for one, course in zip(xi, watched(self.study, xi, self.times), strict=True):
+            self.xi.append(one)
             self.courses.append(course)
 
     def spread(self) -> float:
@@ -79,7 +79,7 @@ class Watch:
         return float(np.abs(np.array(phases[:parameters]) - phases[parameters:]).sum() / 2)
 
 
-def watched(study: Study, germs: Array, times: Array) -> Array:
+def watched(study: Study, xi: Array, times: Array) -> Array:
     """Make these runs, keep what they say at the study's instants, give what they say at `times`.
 
     (runs, samples, signals). Raises InputError, TooManyRunsError, ComputationError, UnsuitableError.
@@ -88,12 +88,12 @@ def watched(study: Study, germs: Array, times: Array) -> Array:
         raise UnsuitableError("nothing is known of this model between its instants")
     instants = study.when
     every = np.union1d(times, instants)
-    answers = study.over_time(every)(study.inputs.values(germs))
-    whole = answers.values.reshape(len(germs), len(every), -1)
-    columns = whole[:, np.searchsorted(every, instants)].reshape(len(germs), -1)
-    study.runs.keep(germs, replace(answers, values=columns))
+    answers = study.over_time(every)(study.inputs.values(xi))
+    whole = answers.values.reshape(len(xi), len(every), -1)
+    columns = whole[:, np.searchsorted(every, instants)].reshape(len(xi), -1)
+    study.runs.keep(xi, replace(answers, values=columns))
     if not answers.good.all():
-        raise UnsuitableError(f"{len(germs) - int(answers.good.sum())} of the longer runs failed: {answers.why}")
+        raise UnsuitableError(f"{len(xi) - int(answers.good.sum())} of the longer runs failed: {answers.why}")
     return np.asarray(whole[:, np.searchsorted(every, times)])
 
 
@@ -191,7 +191,7 @@ class LongTime(Protocol):
         """Of one run; course: (samples, signals). Raises UnsuitableError."""
         ...
 
-    def surrogate(self, study: Study, germs: Array, runs: list[Any], terms: Terms) -> Surrogate:
+    def surrogate(self, study: Study, xi: Array, runs: list[Any], terms: Terms) -> Surrogate:
         """Fitted to these runs, which `of` has told. Raises UnsuitableError, TooSlowError."""
         ...
 
@@ -209,7 +209,7 @@ def grown(study: Study, kind: Callable[[Watch], LongTime], seen: Watch | None = 
 def _grown(study: Study, make: Callable[[Watch], LongTime], seen: Watch) -> Found:
     parameters, wanted = len(study.inputs), study.gap or FINE_GAP
     kind = make(seen)
-    told: list[Any] = []
+    reduced: list[Any] = []
     degree = study.degree or 2
     found: Found | None = None
     worse = 0
@@ -217,25 +217,25 @@ def _grown(study: Study, make: Callable[[Watch], LongTime], seen: Watch) -> Foun
         while degree <= HIGHEST:
             terms = total_degree(parameters, degree)
             seen.follow(missing(study, seen, terms))
-            told += [kind.of(course) for course in seen.courses[len(told) :]]
-            germs = np.array(seen.germs)
-            surrogate = kind.surrogate(study, germs, told, terms)
-            made = len(study.runs.germs)
+            reduced += [kind.of(course) for course in seen.courses[len(reduced) :]]
+            xi = np.array(seen.xi)
+            surrogate = kind.surrogate(study, xi, reduced, terms)
+            made = len(study.runs.xi)
             # Where a polynomial of higher degree would have to look: there this one is put to the test.
             beyond = total_degree(parameters, degree + 2)
-            seen.follow(box_design(study.inputs, germs, beyond, parameters + 1, study.seed + degree))
-            missed = np.abs(surrogate(study.runs.germs[made:]) - study.runs.values[made:]).max(axis=0)
+            seen.follow(box_design(study.inputs, xi, beyond, parameters + 1, study.seed + degree))
+            missed = np.abs(surrogate(study.runs.xi[made:]) - study.runs.values[made:]).max(axis=0)
             error = study.largest(missed, study.runs.values)
             share = _share(study, error)
             why = f"{kind.name} of degree {degree}, fitted to {made} of {study.runs.evaluations} runs"
             worse = 0 if found is None or share < HELPS * found.share else worse + 1
             if found is None or share < found.share:
-                found = Found(why, surrogate, error, foretold=True, share=share)
+                found = Found(why, surrogate, error, of_cycles=True, share=share)
             dear = study.gap is None and study.runs.own > 2 * study.fair
             if share <= wanted or study.degree or worse == 2 or dear:
                 break
             degree += 1
-            while _carried(parameters, degree + 1, len(seen.germs)):
+            while _carried(parameters, degree + 1, len(seen.xi)):
                 degree += 1
         if found is not None:
             found = _controlled(study, found)
@@ -271,9 +271,9 @@ def _carried(parameters: int, degree: int, runs: int) -> bool:
 
 def missing(study: Study, seen: Watch, terms: Terms) -> Array:
     """Where to run for these terms, beside what was run."""
-    parameters, germs = len(study.inputs), np.array(seen.germs)
+    parameters, xi = len(study.inputs), np.array(seen.xi)
     least = len(terms) if parameters == 1 else math.ceil(SHARE * len(terms))
-    return box_design(study.inputs, germs, terms, least - len(germs), study.seed)
+    return box_design(study.inputs, xi, terms, least - len(xi), study.seed)
 
 
 def at_every_instant(places: int, instants: int, at: Callable[[IntArray], Array]) -> Array:

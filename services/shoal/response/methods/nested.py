@@ -55,7 +55,7 @@ FINE = 1e-4
 DECIDING_RUNS = 8
 """Runs at each of the interval values that decide, and one more for each random parameter."""
 APART = 0.15
-"""Interval germs that are nearer to each other are one place."""
+"""Values of the interval variables that are nearer to each other are one place."""
 ENOUGH = 1
 """Times the fair number of runs after which the horizon is looked for."""
 
@@ -77,7 +77,7 @@ def nested(study: Study) -> Found:
             made, found = count, best(study)
             sides = _extremes(study, found)
             where = _deciding(sides)
-            before = len(runs.germs)
+            before = len(runs.xi)
             # What it foretells of these runs, which it was not fitted to, tells how far off it is.
             runs.all(_at(inputs, where, study.seed + 7 + decided))
             decided += len(where)
@@ -100,9 +100,9 @@ def nested(study: Study) -> Found:
     return Found(why, found, error)
 
 
-def _towards_ends(inputs: Inputs, germs: Array) -> Array:
+def _towards_ends(inputs: Inputs, xi: Array) -> Array:
     """Denser towards the ends of the intervals, where polynomials need runs."""
-    return np.where(inputs.random, germs, np.sin(0.5 * np.pi * germs))
+    return np.where(inputs.random, xi, np.sin(0.5 * np.pi * xi))
 
 
 def best(study: Study) -> Expansion:
@@ -114,7 +114,7 @@ def _reaching(study: Study, found: Expansion) -> Expansion:
     """With the error further out than runs tell, at the middle and the ends of the intervals."""
     if not study.inputs.mixed:
         return found
-    found, count = outwards(study.runs.germs, study.runs.values, found), int((~study.inputs.random).sum())
+    found, count = outwards(study.runs.xi, study.runs.values, found), int((~study.inputs.random).sum())
     ends = corners(count) if count < MOST_CORNERS // 2 else np.vstack([np.eye(count), -np.eye(count)])
     of, columns = Conditional(found), study.runs.values.shape[1]
     for place in (np.zeros(count), *ends):
@@ -123,7 +123,7 @@ def _reaching(study: Study, found: Expansion) -> Expansion:
 
 
 def _hidden(of: Conditional, given: Array) -> Array:
-    """Of every column at interval germs of its own, (columns, intervals)."""
+    """Of every column at interval variables of its own, (columns, intervals)."""
     return hidden(of.each(given, np.arange(len(given))), of.random, of.terms)
 
 
@@ -134,7 +134,7 @@ def _extremes(study: Study, found: Expansion) -> list[Extremes]:
 
 
 def _deciding(sides: list[Extremes]) -> Array:
-    """Interval germs where most statistics are extreme, apart from each other, (places, intervals)."""
+    """Values of the intervals where most statistics are extreme, apart from each other, (places, intervals)."""
     every = np.concatenate([place for one in sides for place in (one.at_lower, one.at_upper)])
     different, count = np.unique(np.round(every, 1), axis=0, return_counts=True)
     chosen: list[Array] = []
@@ -150,16 +150,16 @@ def _at(inputs: Inputs, where: Array, seed: int) -> Array:
     """Germs at these interval values, some of the random parameters at each."""
     random = inputs.random
     each = DECIDING_RUNS + int(random.sum())
-    germs = np.empty((len(where) * each, len(inputs)))
-    germs[:, ~random] = np.repeat(where, each, axis=0)
-    germs[:, random] = inputs.some(random).sobol(len(germs), seed)
-    return germs
+    xi = np.empty((len(where) * each, len(inputs)))
+    xi[:, ~random] = np.repeat(where, each, axis=0)
+    xi[:, random] = inputs.some(random).sobol(len(xi), seed)
+    return xi
 
 
 def _unseen(study: Study, found: Expansion, where: Array, before: int) -> Array:
     """Error at the runs since then, the largest over interval values, roots of mean squares, (columns,)."""
-    germs, values = study.runs.germs[before:], study.runs.values[before:]
-    squares, given = (found(germs) - values) ** 2, germs[:, ~study.inputs.random]
+    xi, values = study.runs.xi[before:], study.runs.values[before:]
+    squares, given = (found(xi) - values) ** 2, xi[:, ~study.inputs.random]
     groups = [squares[(given == place).all(axis=1)] for place in where]
     return np.asarray(np.sqrt(np.max([group.mean(axis=0) for group in groups if len(group)], axis=0)))
 
@@ -190,11 +190,11 @@ HELD = 4_000_000
 
 @dataclass(frozen=True)
 class Rule:
-    """germs: of the random parameters, (runs, parameters); mean: weights of its runs, (runs,); others: what the runs
+    """xi: of the random parameters, (runs, parameters); mean: weights of its runs, (runs,); others: what the runs
     are multiplied by for the other coefficients of an orthonormal expansion, (terms, runs)
     """
 
-    germs: Array
+    xi: Array
     mean: Array
     others: Array
 
@@ -211,17 +211,17 @@ def rules(random: Inputs, seed: int) -> Iterator[Rule]:
     if len(random) in GAUSS_POINTS:
         for count in GAUSS_POINTS[len(random)]:
             if min(random.highest(count)) >= count:
-                germs, weights = rule(random, count)
+                xi, weights = rule(random, count)
                 # The variance is the weighted mean of squares, which is never negative.
                 roots = np.sqrt(weights)
-                yield Rule(germs, weights, np.diag(roots) - np.outer(roots, weights))
+                yield Rule(xi, weights, np.diag(roots) - np.outer(roots, weights))
         return
     for degree in DEGREES:
         terms = total_degree(len(random), degree)
         terms = terms[(terms <= random.highest(degree)).all(axis=1)]
-        germs = random.sobol(2 * size(len(random), degree), seed)
-        inverse = np.asarray(np.linalg.pinv(random.basis(germs, terms)), dtype=float)
-        yield Rule(germs, inverse[0], inverse[1:])
+        xi = random.sobol(2 * size(len(random), degree), seed)
+        inverse = np.asarray(np.linalg.pinv(random.basis(xi, terms)), dtype=float)
+        yield Rule(xi, inverse[0], inverse[1:])
 
 
 class Inner:
@@ -244,17 +244,17 @@ class Inner:
         count, before = len(self.columns), None
         for one in rules(self.random, self.study.seed):
             self.rule = one
-            if len(one.germs) > most:
+            if len(one.xi) > most:
                 return None
-            told, good = self._moments(places)
+            values_of, good = self._moments(places)
             if not good.all():
                 return None
-            told[:, count:] = np.sqrt(told[:, count:])
+            values_of[:, count:] = np.sqrt(values_of[:, count:])
             if before is not None:
-                apart = np.asarray(np.abs(told - before).max(axis=0))
-                if np.all(apart <= AGREE * np.tile(told[:, count:].max(axis=0), 2)):
+                apart = np.asarray(np.abs(values_of - before).max(axis=0))
+                if np.all(apart <= AGREE * np.tile(values_of[:, count:].max(axis=0), 2)):
                     return apart
-            before = told
+            before = values_of
         return None
 
     def __call__(self, values: Mapping[str, Array]) -> Answers:
@@ -263,9 +263,9 @@ class Inner:
 
     def _moments(self, values: Mapping[str, Array]) -> tuple[Array, BoolArray]:
         assert self.rule is not None
-        runs, each = self.study.runs, len(self.rule.germs)
-        drawn, places = self.random.values(self.rule.germs), len(next(iter(values.values())))
-        told, good = np.empty((places, 2 * len(self.columns))), np.ones(places, dtype=bool)
+        runs, each = self.study.runs, len(self.rule.xi)
+        drawn, places = self.random.values(self.rule.xi), len(next(iter(values.values())))
+        values_of, good = np.empty((places, 2 * len(self.columns))), np.ones(places, dtype=bool)
         block = max(1, HELD // (each * len(self.study.instants)))
         for k in range(0, places, block):
             part = slice(k, min(k + block, places))
@@ -277,9 +277,9 @@ class Inner:
             runs.aside += count * each
             if runs.progress is not None:
                 runs.progress(runs.evaluations)
-            told[part] = np.hstack(self.rule.moments(answers.values[:, self.columns].reshape(count, each, -1)))
+            values_of[part] = np.hstack(self.rule.moments(answers.values[:, self.columns].reshape(count, each, -1)))
             good[part] = answers.good.reshape(count, each).all(axis=1)
-        return told, good
+        return values_of, good
 
 
 def resolved(study: Study, boxes: ProbabilityBoxes) -> tuple[ProbabilityBoxes, str]:
@@ -315,7 +315,7 @@ def _bounded(study: Study, columns: IntArray, spared: int) -> tuple[Ends, Ends, 
     apart = inner.settle(intervals.values(tried), (study.runs.left - spared) // ONE_IN)
     if apart is None or inner.rule is None:
         raise TooManyRunsError
-    runs = CachedModel(inner, intervals, (study.runs.left - spared) // len(inner.rule.germs))
+    runs = CachedModel(inner, intervals, (study.runs.left - spared) // len(inner.rule.xi))
     # The variance is smooth where the deviation has a kink.
     groups = np.concatenate([study.groups[columns], study.groups[columns] + study.groups.max() + 1])
     outer = Study(runs, groups, np.tile(study.instants[columns], 2), study.seed, INNER_GAP)
@@ -340,7 +340,7 @@ def _bounded(study: Study, columns: IntArray, spared: int) -> tuple[Ends, Ends, 
     std = replace(square, **{side: np.sqrt(np.maximum(getattr(square, side), 0.0)) for side in sides})
     std = _wider(std, apart[count:])
     std = replace(std, lower_outer=np.maximum(std.lower_outer, 0.0))
-    how = f"{runs.evaluations} interval values with {len(inner.rule.germs)} runs over the random parameters each"
+    how = f"{runs.evaluations} interval values with {len(inner.rule.xi)} runs over the random parameters each"
     return _wider(mean, apart[:count]), std, how
 
 
@@ -350,7 +350,7 @@ def _wider(found: Ends, off: Array) -> Ends:
 
 def _within(whole: Ends, columns: IntArray, part: Ends) -> Ends:
     """Replace some columns."""
-    told = {name: np.array(of) for name, of in vars(whole).items()}
+    values_of = {name: np.array(of) for name, of in vars(whole).items()}
     for name, of in vars(part).items():
-        told[name][columns] = of
-    return Ends(**told)
+        values_of[name][columns] = of
+    return Ends(**values_of)

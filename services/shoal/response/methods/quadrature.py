@@ -61,17 +61,17 @@ def _agreeing(study: Study) -> Found | None:
     count = FIRST[len(inputs)]
     while min(inputs.highest(count)) == count:
         made = runs.evaluations
-        germs, weights = rule(inputs, count)
-        if len(germs) > min(MOST[len(inputs)], runs.left - CONTROLS):
+        xi, weights = rule(inputs, count)
+        if len(xi) > min(MOST[len(inputs)], runs.left - CONTROLS):
             return None
         try:
-            runs.all(germs)
+            runs.all(xi)
         except TimeIsUpError:
             return _broken_off(before)
         if runs.failed:
             return None
         values = runs.values[made:] if made else runs.values
-        found = _projected(inputs, germs, weights, values, count)
+        found = _projected(inputs, xi, weights, values, count)
         if before is not None:
             std, apart = np.sqrt(found.variance), np.abs(found.mean - before.mean)
             apart = np.maximum(apart, np.abs(std - np.sqrt(before.variance)))
@@ -99,7 +99,7 @@ def _controlled(study: Study, found: Expansion, apart: Array, count: int) -> Fou
     if runs.failed:
         return None
     values = runs.values[made:]
-    missed = np.sqrt(np.mean((found(runs.germs[made:]) - values) ** 2, axis=0))
+    missed = np.sqrt(np.mean((found(runs.xi[made:]) - values) ** 2, axis=0))
     if np.any(missed > ROUGH * CONVERGED * study.largest(np.sqrt(found.variance), values)):
         return None
     error = apart + SURE * missed / np.sqrt(CONTROLS)
@@ -117,7 +117,7 @@ def rule(inputs: Inputs, count: int) -> tuple[Array, Array]:
     return np.stack([axis.ravel() for axis in axes], axis=1)[some], weight[some]
 
 
-def _projected(inputs: Inputs, germs: Array, weights: Array, values: Array, count: int) -> Expansion:
+def _projected(inputs: Inputs, xi: Array, weights: Array, values: Array, count: int) -> Expansion:
     terms = tensor(len(inputs), count - 1)
-    basis = inputs.basis(germs, terms)
+    basis = inputs.basis(xi, terms)
     return Expansion(inputs, terms, basis.T @ (weights[:, None] * values), np.zeros(values.shape[1]))

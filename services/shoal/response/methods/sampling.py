@@ -37,9 +37,9 @@ def of_distributions(study: Study, count: int) -> Found:
         study.runs.all(inputs.sobol(count, study.seed))
         return Found(f"{count} quasi-random runs")
     base = 2 ** max(3, int(np.log2(max(count // (parameters + 2), 8))))
-    germs = designs(inputs, base, study.seed)
-    total, failed = len(germs), study.runs.failed
-    made = study.runs.all(germs)
+    xi = designs(inputs, base, study.seed)
+    total, failed = len(xi), study.runs.failed
+    made = study.runs.all(xi)
     if study.runs.failed > failed:
         return Found(f"{made} quasi-random runs; some failed, so that there are no indices")
     return Found(f"{made} quasi-random runs", indices=jansen(study.runs.values[-total:], parameters))

@@ -58,16 +58,16 @@ class Warped:
     course: Array
     instants: Array
 
-    def __call__(self, germs: Array) -> Array:
+    def __call__(self, xi: Array) -> Array:
         """(places, columns)."""
-        basis = self.inputs.basis(germs, self.terms)
-        return at_every_instant(len(germs), len(self.instants), lambda at: self._at(basis, at))
+        basis = self.inputs.basis(xi, self.terms)
+        return at_every_instant(len(xi), len(self.instants), lambda at: self._at(basis, at))
 
-    def each(self, germs: Array, columns: IntArray) -> Array:
+    def each(self, xi: Array, columns: IntArray) -> Array:
         """One column at each place, (places,)."""
         signals = self.course.shape[2]
-        told = self._at(self.inputs.basis(germs, self.terms), columns // signals)
-        return np.asarray(told[np.arange(len(germs)), columns % signals])
+        answers = self._at(self.inputs.basis(xi, self.terms), columns // signals)
+        return np.asarray(answers[np.arange(len(xi)), columns % signals])
 
     @cached_property
     def _by_turn(self) -> Array:
@@ -89,12 +89,12 @@ class Warped:
         start = begin(turn)
         phase = 2 * (when - start) / (begin(turn + 1) - start) - 1
         within = np.polynomial.chebyshev.chebvander(phase, NODES - 1)
-        told = np.empty((len(when), self.course.shape[2]))
+        answers = np.empty((len(when), self.course.shape[2]))
         order = np.argsort(turn, kind="stable")
         for some in np.split(order, np.flatnonzero(np.diff(turn[order])) + 1):
             products = (within[some, :, None] * basis[some, None, :]).reshape(len(some), -1)
-            told[some] = products @ self.course[turn[some[0]]]
-        return told
+            answers[some] = products @ self.course[turn[some[0]]]
+        return answers
 
 
 @dataclass(frozen=True)
@@ -114,17 +114,17 @@ class TimeWarp:
         to_coefficients = np.linalg.inv(np.polynomial.chebyshev.chebvander(x, NODES - 1))
         return Cycles(turns, np.einsum("ij,kjs->kis", to_coefficients, whole(at)))
 
-    def surrogate(self, study: Study, germs: Array, runs: list[Cycles], terms: Terms) -> Warped:
+    def surrogate(self, study: Study, xi: Array, runs: list[Cycles], terms: Terms) -> Warped:
         """Raises UnsuitableError, TooSlowError."""
         turns = min(len(run.turns) for run in runs) - 1
         if turns * len(terms) * runs[0].course[0].size > MOST:
             raise UnsuitableError(f"{turns} turning points are too many")
         if min(run.turns[turns] for run in runs) <= study.when[-1]:
             raise TooSlowError
-        told = np.concatenate(
+        answers = np.concatenate(
             [np.concatenate([run.turns[: turns + 1], run.course[:turns].ravel()])[None] for run in runs]
         )
-        found = fit(study.inputs, germs, told, terms).coefficients
+        found = fit(study.inputs, xi, answers, terms).coefficients
         shape = len(terms), turns, NODES, runs[0].course.shape[2]
         course = np.moveaxis(found[:, turns + 1 :].reshape(shape), 0, 2)
         return Warped(

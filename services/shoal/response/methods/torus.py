@@ -60,24 +60,24 @@ class Wound:
     orders: IntArray
     instants: Array
 
-    def __call__(self, germs: Array) -> Array:
+    def __call__(self, xi: Array) -> Array:
         """(places, columns)."""
-        basis = self.inputs.basis(germs, self.terms)
-        told = basis @ self.frequencies, np.tensordot(basis, self.waves, 1)
-        return at_every_instant(len(germs), len(self.instants), lambda at: self._at(*told, at))
+        basis = self.inputs.basis(xi, self.terms)
+        parts = basis @ self.frequencies, np.tensordot(basis, self.waves, 1)
+        return at_every_instant(len(xi), len(self.instants), lambda at: self._at(*parts, at))
 
-    def each(self, germs: Array, columns: IntArray) -> Array:
+    def each(self, xi: Array, columns: IntArray) -> Array:
         """One column at each place, (places,)."""
         signals = self.waves.shape[2]
-        basis = self.inputs.basis(germs, self.terms)
-        found = np.empty(len(germs))
+        basis = self.inputs.basis(xi, self.terms)
+        found = np.empty(len(xi))
         block = max(1, 20_000_000 // self.waves[0].size)
-        for k in range(0, len(germs), block):
+        for k in range(0, len(xi), block):
             some = slice(k, k + block)
-            told = self._at(
+            parts = self._at(
                 basis[some] @ self.frequencies, np.tensordot(basis[some], self.waves, 1), columns[some] // signals
             )
-            found[some] = told[np.arange(len(told)), columns[some] % signals]
+            found[some] = parts[np.arange(len(parts)), columns[some] % signals]
         return found
 
     def _at(self, frequencies: Array, waves: Array, at: IntArray) -> Array:
@@ -131,10 +131,10 @@ class Torus:
             )
         return found
 
-    def surrogate(self, study: Study, germs: Array, runs: list[LineSpectrum], terms: Terms) -> Wound:
+    def surrogate(self, study: Study, xi: Array, runs: list[LineSpectrum], terms: Terms) -> Wound:
         """See `LongTime`."""
-        told = np.stack([np.concatenate([run.frequencies, run.coefficients.ravel()]) for run in runs])
-        found = fit(study.inputs, germs, told, terms).coefficients
+        parts = np.stack([np.concatenate([run.frequencies, run.coefficients.ravel()]) for run in runs])
+        found = fit(study.inputs, xi, parts, terms).coefficients
         base = len(runs[0].frequencies)
         waves = found[:, base:].reshape(len(terms), *runs[0].coefficients.shape)
         return Wound(study.inputs, terms, found[:, :base], waves, self.orders, study.when)

@@ -57,8 +57,8 @@ def response_table(response: Response) -> None:
         _shares(response)
     if response.boxes is not None and response.boxes.shares is not None:
         _shares_between(response, response.boxes)
-    for judged in response.limits:
-        _limit(judged)
+    for result in response.limits:
+        _limit(result)
     if response.allocation is not None:
         _allocation(response.allocation)
     screen.say(
@@ -106,47 +106,47 @@ def _by_model(response: Response) -> str:
     return "" if response.errors.total is None else f" and the known error of the model, {response.errors.total:.1e} m"
 
 
-def _limit(judged: LimitResult) -> None:
+def _limit(result: LimitResult) -> None:
     """Print the result of a limit, and the values at which it is decided."""
-    title, shown, at = judged.limit.title, judged.shown, looked_at(judged.times)
-    if judged.between is not None:
-        _between(title, judged, judged.between)
+    title, shown, at = result.limit.title, result.shown, looked_at(result.times)
+    if result.between is not None:
+        _between(title, result, result.between)
         how = "most probably with"
-    elif judged.passing is not None:
-        estimate = judged.passing.estimate
-        lower, upper = judged.interval
+    elif result.exceedance is not None:
+        estimate = result.exceedance.estimate
+        lower, upper = result.interval
         screen.say(
-            f"{title}: {judged.limit.event} {at} with probability {estimate.told}, with 95 % confidence between "
+            f"{title}: {result.limit.event} {at} with probability {estimate.described}, with 95 % confidence between "
             f"{lower:.3g} and {upper:.3g}",
-            f"  by {judged.passing.why}; {judged.evaluations} runs",
+            f"  by {result.exceedance.why}; {result.evaluations} runs",
             style="bold",
         )
-        how = "most probably with" if judged.passing.points else "nearest with"
+        how = "most probably with" if result.exceedance.points else "nearest with"
     else:
-        undecided = f"{judged.limit.verdict(True)} in all runs {at}, which proves nothing"
-        undecided = f"is not decided {at}: {message(judged.reasons)}" if judged.hidden else undecided
-        holds = f"{judged.limit.verdict(True)} for all values {at}"
-        says = {True: holds, False: judged.limit.verdict(False), None: undecided}
-        screen.say(f"{title}: {says[judged.kept]}", style="bold")
-        how = f"{judged.limit.event.removeprefix('is ')} with" if judged.kept is False else "nearest with"
+        undecided = f"{result.limit.verdict(True)} in all runs {at}, which proves nothing"
+        undecided = f"is not decided {at}: {message(result.reasons)}" if result.hidden else undecided
+        holds = f"{result.limit.verdict(True)} for all values {at}"
+        says = {True: holds, False: result.limit.verdict(False), None: undecided}
+        screen.say(f"{title}: {says[result.kept]}", style="bold")
+        how = f"{result.limit.event.removeprefix('is ')} with" if result.kept is False else "nearest with"
     if shown is not None:
         known = ", ".join(f"{name} = {value:.6g}" for name, value in shown.parameters.items())
-        error = f", {judged.errors.brief}" if judged.errors.estimates else ""
-        margin = f"margin {shown.margin:.3g} {judged.limit.unit} at {shown.time:g} s{error}"
+        error = f", {result.errors.brief}" if result.errors.estimates else ""
+        margin = f"margin {shown.margin:.3g} {result.limit.unit} at {shown.time:g} s{error}"
         screen.say(f"  {how} {known}: {margin if math.isfinite(shown.margin) else shown.message}")
 
 
-def _between(title: str, judged: LimitResult, found: ProbabilityBounds) -> None:
+def _between(title: str, result: LimitResult, found: ProbabilityBounds) -> None:
     """Print two bounds of a probability, and the interval values at which they are attained."""
-    (least, largest), (lower, upper) = judged.estimates, found.interval
+    (least, largest), (lower, upper) = result.estimates, found.interval
     screen.say(
-        f"{title}: {judged.limit.event} {looked_at(judged.times)} with a probability between {least.told} and "
-        f"{largest.told}, with 95 % confidence between {lower:.3g} and {upper:.3g}",
+        f"{title}: {result.limit.event} {looked_at(result.times)} with a probability between {least.described} and "
+        f"{largest.described}, with 95 % confidence between {lower:.3g} and {upper:.3g}",
         style="bold",
     )
     for name, at in (("least", found.at_lower), ("largest", found.at_upper)):
         screen.say(f"  {name} with {', '.join(f'{path} = {value:.6g}' for path, value in at.items())}")
-    screen.say(f"  by {found.places} interval values and {judged.evaluations} runs")
+    screen.say(f"  by {found.places} interval values and {result.evaluations} runs")
 
 
 def _allocation(found: Allocation) -> None:
@@ -159,7 +159,7 @@ def _allocation(found: Allocation) -> None:
         table.add_row(escape(name), *(f"{x:.3g}" for x in numbers))
     screen.out.print(table)
     screen.say(
-        f"{found.what} {found.stated:.3g} with the stated tolerances, {found.reached} with those found, which "
+        f"{found.what} {found.stated:.3g} with the stated tolerances, {found.confirmed_text} with those found, which "
         f"cost {found.cost:.3g} times as much; to tighten first: {found.first or 'none'}; {found.evaluations} runs"
     )
 
