@@ -287,7 +287,7 @@ def test_engine_of_its_page_agrees_with_ours(tmp_path: Path) -> None:
 def test_surrogate_sampler_and_reliability_method_of_their_page_agree_with_ours(tmp_path: Path) -> None:
     program = (
         "[[[of.bounds.lower.tolist(), of.bounds.upper.tolist(), of.bounds.gap, of.why] for of in (spline, auto)], "
-        "[[*of.limits[0].interval, of.evaluations, of.limits[0].passing.why] for of in (stratified, plain)]]"
+        "[[*of.limits[0].interval, of.evaluations, of.limits[0].exceedance.why] for of in (stratified, plain)]]"
     )
     (ours, theirs), chances = used("extend/surrogate.md", "response", tmp_path, program)
     np.testing.assert_allclose(ours[:2], theirs[:2], atol=1e-5)

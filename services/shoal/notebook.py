@@ -422,7 +422,7 @@ def _file(data: Any, table: Path) -> str:
 
 
 def _html(result: Any) -> str:
-    """What a notebook shows."""
+    """Return the HTML that a notebook shows."""
     from shoal.pictures.inline import html
 
     return html(result)

@@ -154,7 +154,7 @@ def test_sections_between_loads_are_refused_before_the_study() -> None:
 
 def test_another_engine_tells_no_section_forces() -> None:
     scene = load_scene("flexible-double-pendulum")
-    with pytest.raises(InputError, match="told by the engine gauss alone; found exudyn"):
+    with pytest.raises(InputError, match="computed by the engine gauss alone; found exudyn"):
         uncertain(scene, {"initial.OA.angle": (0.75, 0.8)}, [0.1], limit=["O.force > 3"], engine="exudyn")
     assert limit("B.normal > 3", scene).unit == "N"
 

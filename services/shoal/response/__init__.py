@@ -1,4 +1,4 @@
-"""How a machine answers when its parameters are known as intervals or distributions only."""
+"""Response of machines whose parameters are known as intervals or distributions only."""
 
 from shoal.response.respond import respond
 from shoal.response.result import Response

@@ -1,4 +1,4 @@
-"""How wide tolerances may be where some parameters, or all, are random.
+"""Allocation of tolerances where some parameters, or all, are random.
 
 The largest probability over the intervals is what must stay below the target. In the standard normal space of the
 random parameters the margin is least, at the distance of the target's reliability index, at a place that always exists
@@ -11,7 +11,7 @@ with factors s on the tolerances. It is exact where the margin is linear and the
 correlated normal. It is convex in the factors, as is the cost (Boyd, Kim, Vandenberghe and Hassibi, A tutorial on
 geometric programming, Optimization and Engineering 8, 2007, for its form in logarithms), so that the cheapest factors
 are known; there the model is asked again. The distance is corrected, either way, by the probability that a study of the
-limit tells.
+limit gives.
 """
 
 from __future__ import annotations
@@ -61,12 +61,12 @@ from shoal.trajectory import Array
 MARGIN = 0.01
 """Of the reliability index, by which more is aimed at where a confirming study finds too little or too much."""
 NEAR, OFF = 0.9, 0.5
-"""Shares of the target above which a probability is the target, and below which tolerances are told to be too tight."""
+"""Shares of the target from which a probability attains it, and below which tolerances are reported as too tight."""
 
 
 @dataclass(frozen=True)
 class Cut:
-    """What bounds the factors, in units of the margin: pull @ s + beta |spread @ s| <= room.
+    """Linear bound on the factors and their scatter, in units of the margin: pull @ s + beta |spread @ s| <= room.
 
     pull: (parameters,); spread: of the margin by independent standard normal variables, (parameters, parameters)
     """
@@ -80,7 +80,7 @@ class Cut:
         return float(self.pull @ factors + beta * np.linalg.norm(self.spread @ factors))
 
     def slope(self, factors: Array, beta: float) -> Array:
-        """Of that by each factor, (parameters,)."""
+        """Return the derivative of the left side by each factor, (parameters,)."""
         along = self.spread @ factors
         return np.asarray(self.pull + beta * self.spread.T @ along / max(float(np.linalg.norm(along)), 1e-300))
 
@@ -92,7 +92,7 @@ def cheapest(cuts: list[Cut], costs: Array, beta: float, most: Array) -> Array:
     start = np.clip(share * most, TIGHTEST, most)
 
     def within(one: Cut) -> optimize.NonlinearConstraint:
-        """Of the room that logarithms of factors take up."""
+        """Return the constraint of one cut on the logarithms of the factors."""
 
         def used(x: Array) -> Array:
             return np.array([one.used(np.exp(x), beta) / one.room])
@@ -116,7 +116,7 @@ def cheapest(cuts: list[Cut], costs: Array, beta: float, most: Array) -> Array:
 
 @dataclass(frozen=True)
 class Deciding:
-    """What decides about the probability, and how the margin there falls as tolerances grow.
+    """Decisive values of the parameters, and the fall of the margin there as tolerances grow.
 
     xi: of the intervals; place: of the random parameters; falls: if each tolerance doubles, to first order,
     (parameters,); beyond: by how much the reliability index may be less at other interval values
@@ -136,7 +136,7 @@ class Deciding:
         return Cut(pull, spread, self.place.margin + float(pull @ factors) + beta * self.place.slope)
 
     def effects(self, beta: float) -> Array:
-        """By which share the probability falls if a tolerance becomes one per cent smaller, (parameters,).
+        """Return the share by which the probability falls if a tolerance becomes one per cent smaller, (parameters,).
 
         beta: the index of that probability. It grows by as many standard deviations as the margin does.
         """
@@ -156,12 +156,12 @@ class Confirmed:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Of the probability, of 95 % confidence."""
+        """95 % confidence interval of the probability."""
         lower, upper = self.estimate.interval
         return float(lower[-1]), float(upper[-1])
 
     def near(self, target: float) -> bool:
-        """Return whether the probability is the target as far as can be told, and not above."""
+        """Return whether the probability is the target within its interval, and not above."""
         chance = self.estimate.probability
         return 0 < chance <= target <= max(chance / NEAR, float(np.nan_to_num(self.interval[1])))
 
@@ -190,7 +190,7 @@ def of_random(
     widest: Array,
     **how: Any,
 ) -> Allocation:
-    """So that the limit is exceeded with a probability of at most `target`, whatever the values of the intervals.
+    """Allocate tolerances so that the limit is exceeded with a probability of at most `target`, whatever the intervals.
 
     stated: what is known of the limit with the stated tolerances; widest: factors; how: of `between`. Raises
     InputError, ComputationError.
@@ -253,7 +253,9 @@ def of_random(
 
 
 def _xi(inputs: Inputs, xi: Array, place: Array | None) -> Array:
-    """Of all parameters, (1, parameters): those of the intervals, and of a place of the random ones or their middle."""
+    """Return xi of all parameters, (1, parameters): of the intervals, and of a place of the random ones or their
+    middle.
+    """
     found = np.zeros((1, len(inputs)))
     found[0, ~inputs.random] = xi
     if inputs.random.any():
@@ -265,7 +267,8 @@ def _xi(inputs: Inputs, xi: Array, place: Array | None) -> Array:
 def _deciding(
     limit: Limit, machine: ResponseModel, inputs: Inputs, beta: float, seed: int, *, on: bool = False
 ) -> tuple[Deciding, int]:
-    """Where the margin is least over the intervals and at that distance of the random parameters; runs.
+    """Find the least margin over the intervals and at that distance of the random parameters; also return the runs
+    made.
 
     on: at the place on the limit beside it, which lies at another distance where the limit bends
     """
@@ -301,8 +304,8 @@ def _deciding(
 
 
 def _falls(model: ResponseModel, inputs: Inputs, xi: Array, instant: int) -> Array:
-    """By how much the margin falls at standardised variables, (1, parameters), if each tolerance doubles, to first
-    order, (parameters,).
+    """Return by how much the margin falls at xi, (1, parameters), if each tolerance doubles, to first order,
+    (parameters,).
 
     From narrower ones, as wider ones may reach where the machine has no sense.
     """
@@ -318,7 +321,7 @@ def _falls(model: ResponseModel, inputs: Inputs, xi: Array, instant: int) -> Arr
 def _confirmed(
     limit: Limit, machine: ResponseModel, inputs: Inputs, factors: Array, beyond: float, **how: Any
 ) -> tuple[Confirmed, int]:
-    """By the largest probability over the intervals; runs. beyond: of `Deciding`."""
+    """Confirm factors by the largest probability over the intervals; also return the runs. beyond: of `Deciding`."""
     here = with_factors(inputs, factors)
     if not inputs.mixed:
         margins = Margins(watched(machine, limit), here, MOST)
@@ -327,7 +330,7 @@ def _confirmed(
     found = between(limit, machine, here, **{**how, "verify": False, "progress": None})
     assert found.between is not None
     largest = found.between.upper
-    # The index has no bound where a limit cannot be passed, and no polynomial follows it there; the margin has.
+    # The index has no bound where a limit cannot be exceeded, and no polynomial follows it there; the margin has.
     reasons = [*largest.reasons, *undecided(min(found.between.beyond[1], beyond))]
     return Confirmed(factors, largest.estimates[0], reasons), found.evaluations
 

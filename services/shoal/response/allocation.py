@@ -1,4 +1,4 @@
-"""How wide tolerances may be so that a limit is kept, and which one to tighten for most effect.
+"""Allocation of tolerances so that a limit is kept, and the one to tighten for most effect.
 
 A tolerance is the half width of an interval, or the standard deviation of a distribution. Costs grow with its
 reciprocal (Chase and Greenwood, Design issues in mechanical tolerance analysis, Manufacturing Review 1, 1988). What
@@ -27,7 +27,7 @@ from shoal.scene import Scene
 from shoal.trajectory import Array
 
 WIDEST, TIGHTEST = 3.0, 1e-3
-"""Factors on the tolerances that are stated, beyond which none is looked at."""
+"""Factors on the tolerances that are stated, beyond which none is tried."""
 ROUNDS = 15
 SETTLED = 5e-3
 """Relative change of all factors at which the search ends."""
@@ -36,13 +36,13 @@ MANY = 100_000
 STEP = 0.02
 """Of differences, as a share of a tolerance that is stated."""
 TARGET = 1e-3
-"""Probability of passing a limit, where none is stated."""
+"""Probability of exceeding a limit, where none is stated."""
 Least = Callable[[Inputs], "LeastMargin"]
 
 
 @dataclass(frozen=True)
 class LeastMargin:
-    """Of intervals: the least margin that may be, by outer bounds, and by a run; where that is."""
+    """Least margin over intervals: by outer bounds, and as attained by a run at `xi`."""
 
     outer: float
     attained: float
@@ -84,13 +84,13 @@ class Allocation:
 
     @property
     def what(self) -> str:
-        """What is confirmed, in words."""
+        """Name of the quantity that is confirmed."""
         random = self.inputs.random
         return "least margin" if not random.any() else "probability" if random.all() else "largest probability"
 
     @property
     def confirmed_text(self) -> str:
-        """What is confirmed, and how well it is known, in words."""
+        """Confirmed quantity in words, with its interval."""
         if self.interval is None or not np.all(np.isfinite(self.interval)):
             return f"{self.confirmed:.3g}"
         low, high = self.interval
@@ -98,7 +98,7 @@ class Allocation:
 
     @property
     def first(self) -> str | None:
-        """Which parameter's tolerance to tighten first, None where none has an effect."""
+        """Name of the parameter whose tolerance to tighten first, None where none has an effect."""
         return None if not np.any(self.effects > 0) else self.inputs.names[int(np.argmax(self.effects))]
 
     def to_json(self) -> dict[str, Any]:
@@ -170,9 +170,9 @@ def cheapest(weights: Array, costs: Array, room: float, most: Array) -> Array:
 
 
 def of_intervals(text: str, model: Model, inputs: Inputs, least: Least, costs: Array, most: Array) -> Allocation:
-    """So that no values within the tolerances pass the limit: the outer bound of the least margin stays at zero.
+    """Allocate tolerances within which no values exceed the limit: the outer bound of the least margin stays at zero.
 
-    model: margins over time. Raises ComputationError if the middle values pass it.
+    model: margins over time. Raises ComputationError if the middle values exceed it.
     """
     factors, evaluations = np.ones(len(inputs)), 0
     stated, effects = math.nan, np.zeros(len(inputs))
@@ -224,7 +224,7 @@ def _outer(least: Least, inputs: Inputs) -> tuple[float, int]:
 
 
 def _shrunk(factors: Array, look: Callable[[Array], tuple[float, int]]) -> tuple[float, Array, int]:
-    """All factors smaller by the same share, until the look confirms them."""
+    """Shrink all factors by the same share until `look` confirms them."""
     evaluations = 0
     for share in (1.0, 0.999, 0.99, 0.97, 0.9, 0.75, 0.5):
         found, runs = look(np.maximum(share * factors, TIGHTEST))
@@ -235,7 +235,7 @@ def _shrunk(factors: Array, look: Callable[[Array], tuple[float, int]]) -> tuple
 
 
 def _pull(model: Model, inputs: Inputs, xi: Array, factors: Array) -> tuple[Array, int]:
-    """By how much the margin falls at the worst place where each tolerance grows, per factor, (parameters,), and runs.
+    """Return the fall of the margin at the worst place per factor of each tolerance, (parameters,), and the runs made.
 
     The worst place moves outwards with the tolerance: d margin / d xi * xi /
     factor.
@@ -252,12 +252,12 @@ def _pull(model: Model, inputs: Inputs, xi: Array, factors: Array) -> tuple[Arra
 
 
 def unattainable(text: str) -> ComputationError:
-    """What to say of a requirement that no tolerances keep."""
-    return ComputationError(f"allocate: {text} does not hold at the middle values, whatever the tolerances")
+    """Return the error of a requirement that no tolerances keep."""
+    return ComputationError(f"allocate: {text} does not hold at the middle values, with any tolerances")
 
 
 def costs_of(texts: Mapping[str, float], inputs: Inputs) -> Array:
-    """One for every parameter but those that are stated, (parameters,). Raises InputError."""
+    """Return a cost for every parameter, 1 where none is stated, (parameters,). Raises InputError."""
     for name, cost in texts.items():
         if name not in inputs.names:
             raise InputError(f"cost: {name!r} is not varied; there are {', '.join(inputs.names)}")
@@ -267,7 +267,7 @@ def costs_of(texts: Mapping[str, float], inputs: Inputs) -> Array:
 
 
 def accepted(scene: Scene, inputs: Inputs) -> Array:
-    """Up to which factors the scene accepts the ends of each tolerance by itself, at most `WIDEST`, (parameters,)."""
+    """Return the factors up to which the scene accepts the ends of each tolerance, at most `WIDEST`, (parameters,)."""
     found = []
     for one in inputs.parameters:
         most = WIDEST

@@ -104,9 +104,9 @@ def allow_for_limits(
 
 
 SHARE, LEAST = 5, 500
-"""One in so many of the runs that a probability takes, but this number at least, tells the index while it is sought."""
+"""One in so many of the runs for a probability, but this number at least, estimates the index during the search."""
 PLACES, MORE = 12, 6
-"""Interval values that are looked at, and more for each interval, at most."""
+"""Interval values that are examined, and more for each interval, at most."""
 SHARED = 2
 """Times as many indices as a plane through them has terms, at least, if some are left out of a fit."""
 GAP = 0.05
@@ -133,7 +133,7 @@ def between(
     ends = []
     for k, named in enumerate((bounds.at_upper[0], bounds.at_lower[0])):
         values = given.at(named)
-        # Other seeds than while it was sought: what was least by chance is not told as the least.
+        # Other seeds than while it was sought: what was least by chance is not reported as the least.
         here, on, other = machine.at(values), _counting(progress, made), seed + 101 + k
         one = judge(limit, here, random, _no_reach, way=way, most=most, seed=other, verify=verify, progress=on)
         made, failed = made + one.evaluations, failed + one.failed
@@ -164,7 +164,7 @@ def searched(
     given, random, made, failed = inputs.some(~inputs.random), inputs.some(inputs.random), 0, 0
 
     def index(values: Mapping[str, Array]) -> Answers:
-        """Of every place."""
+        """Return the reliability index at every place."""
         nonlocal made, failed
         found = np.full((len(next(iter(values.values()))), 1), np.nan)
         why = ""
@@ -182,10 +182,10 @@ def searched(
 
 
 def _beyond(runs: CachedModel, seed: int) -> tuple[float, float]:
-    """By how much the index may be above the largest one that is known, and below the least.
+    """Return by how much the index may exceed the largest one that is known, and fall below the least.
 
-    Indices are known to the scatter of few runs: of all polynomials the one that foretells left-out ones best tells. Of
-    those that are FAR nothing else is known, and beyond them lies no probability to tell: they stay out of the fit.
+    Indices are known to the scatter of few runs: the polynomial that predicts left-out ones best is taken. Of
+    those that are FAR nothing else is known, and beyond them lies no measurable probability: they stay out of the fit.
     """
     near = runs.values[:, 0] < FAR
     some = not near.all() and near.sum() > SHARED * (len(runs.inputs) + 1)
@@ -215,7 +215,7 @@ def _no_reach(_: object, _size: float) -> tuple[Array, Array, Array, int, int]:
 def crosschecked(assessed: LimitResult, machine: ResponseModel, values: Array, *, shared: bool) -> LimitResult:
     """Test a probability against the runs that estimated mean and standard deviation of the limit's quantity.
 
-    values: (runs, columns); shared: whether runs share parameters with others, as those that tell indices do
+    values: (runs, columns); shared: whether runs share parameters with others, as those for indices do
     """
     columns = _columns(machine, assessed.limit)
     if assessed.exceedance is None or columns is None or not len(values):
@@ -256,10 +256,10 @@ def shifts(limit: Limit, mean: Array, error: Array, estimate: ExceedanceEstimate
     """Return the shift of the mean and the least standard deviation that a probability implies, (instants,) each.
 
     With probability p beyond a bound at distance d from the mean that is p d and, by Cantelli's inequality,
-    d sqrt(p / (1 - p)); on both sides by Chebyshev's d sqrt(p). mean: told, to within `error`
+    d sqrt(p / (1 - p)); on both sides by Chebyshev's d sqrt(p). mean: estimated to within `error`
     """
     lower, _ = ends(estimate)
-    # To be passed for the first time is no more probable than to be beyond.
+    # To be exceeded for the first time is no more probable than to be beyond.
     first = np.diff(estimate.exceeded, prepend=0.0)
     p = np.clip(first * lower / estimate.probability, 0.0, 0.5) if estimate.probability > 0 else np.zeros(len(first))
     distance = np.maximum(limit.margin(mean) - np.nan_to_num(error), 0.0)

@@ -22,10 +22,10 @@ from shoal.response.study import FAIR, LEAST, Study
 from shoal.trajectory import Array
 
 CHOICE = 8
-"""Places that are looked at, for every term."""
+"""Candidate places for every term."""
 FEWEST = 256
 UNKNOWN = 1e-8
-"""Of one run: what is known of a term that no run tells of."""
+"""Prior information on every term, as a share of that of one run."""
 
 
 def box_places(inputs: Inputs, count: int, seed: int) -> Array:
@@ -40,10 +40,10 @@ def box_places(inputs: Inputs, count: int, seed: int) -> Array:
 
 
 def telling(inputs: Inputs, xi: Array, terms: Terms, count: int, places: Array) -> Array:
-    """So many of these places, beside the runs at `xi`, (count, parameters)."""
+    """Choose places that determine the terms best beside the runs at `xi`, (count, parameters)."""
     known = inputs.basis(xi, terms)
     factor = np.linalg.cholesky(known.T @ known + UNKNOWN * np.eye(len(terms)))
-    # Rows in which what is known has the unit matrix: their squares tell how little is known at a place.
+    # Rows in which what is known has the unit matrix: their squares are the prediction variance at a place.
     rows = solve_triangular(factor, inputs.basis(places, terms).T, lower=True).T
     unknown = np.einsum("ij,ij->i", rows, rows)
     chosen: list[int] = []
@@ -51,7 +51,7 @@ def telling(inputs: Inputs, xi: Array, terms: Terms, count: int, places: Array) 
     for k in range(len(taken)):
         best = int(np.argmax(unknown))
         chosen.append(best)
-        # The direction in which a run there tells something new, of the length by which it lessens what is unknown.
+        # The direction of new information of a run there, of the length by which it lessens the variance.
         new = rows[best] - taken[:k].T @ (taken[:k] @ rows[best])
         taken[k] = new / np.sqrt(1 + unknown[best])
         unknown -= (rows @ taken[k]) ** 2
@@ -59,7 +59,7 @@ def telling(inputs: Inputs, xi: Array, terms: Terms, count: int, places: Array) 
 
 
 def box_design(inputs: Inputs, xi: Array, terms: Terms, count: int, seed: int) -> Array:
-    """So many places in the box of intervals for these terms, beside the runs at `xi`."""
+    """Choose places in the box of intervals for these terms beside the runs at `xi`."""
     if count <= 0:
         return np.empty((0, len(inputs)))
     places = box_places(inputs, max(FEWEST, CHOICE * len(terms)), seed)
@@ -86,7 +86,7 @@ class Screened:
 
     @property
     def fair(self) -> int:
-        """As that of a study, of the terms that there are."""
+        """Runs that the terms may take without further reason, as `Study.fair`."""
         return max(LEAST, int(FAIR * self.size(4)))
 
     def size(self, degree: int) -> int:
@@ -95,7 +95,7 @@ class Screened:
         return size(count, degree) + (len(self.active) - count) * min(degree, ALONE)
 
     def terms(self, degree: int) -> Terms:
-        """Of total degree, the lower ones first, the linear ones in the order of the parameters."""
+        """Return terms of total degree, the lower ones first, the linear ones in the order of the parameters."""
         whole = np.zeros((size(int(self.active.sum()), degree), len(self.active)), dtype=np.int64)
         whole[:, self.active] = total_degree(int(self.active.sum()), degree)
         alone = np.eye(len(self.active), dtype=np.int64)[~self.active]
@@ -105,13 +105,13 @@ class Screened:
 
     @cached_property
     def why(self) -> str:
-        """In words, empty where all take part."""
+        """Description, empty where all parameters take part."""
         left = [name for name, active in zip(self.study.inputs.names, self.active, strict=True) if not active]
         return f"; {len(left)} of {len(self.active)} parameters have little effect and no products" if left else ""
 
 
 def screened(study: Study) -> Screened:
-    """After the runs of a star: the centre and both ends of every axis."""
+    """Screen parameters by the runs of a star: the centre and both ends of every axis."""
     parameters, xi, values = len(study.inputs), study.runs.xi, study.runs.values
     everyone = np.ones(parameters, dtype=bool)
     if parameters <= MOST_ACTIVE:

@@ -6,8 +6,8 @@ total degree n that is at most e on the box changes by at most n e for every rad
 points (Bernstein's inequality). Where a bound is attained by a run, and the answer falls off from there faster than
 that, the attained bound is the bound.
 
-Few runs are fitted by a polynomial of low degree whatever lies between them, and extremal points of that polynomial are
-where it is evaluated. Control runs, which do not depend on it, lie all over the box.
+Few runs are fitted by a polynomial of low degree irrespective of what lies between them, and extremal points of that
+polynomial are where it is evaluated. Control runs, which do not depend on it, lie all over the box.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def unseen(count: int) -> float:
 
 
 def control_misses(study: Study, surrogate: Surrogate) -> Array:
-    """Make the runs, as many as may be made, and tell by how much a surrogate misses them at most, (columns,).
+    """Make the runs, as many as may be made, and return the largest error of a surrogate there, (columns,).
 
     Raises TooManyRunsError, InputError.
     """
@@ -54,12 +54,12 @@ def control_misses(study: Study, surrogate: Surrogate) -> Array:
 
 
 def contradicts(study: Study, missed: Array, error: Array) -> BoolArray:
-    """Return whether runs are missed by more than the error that was told, and by what matters, (columns,)."""
+    """Return where errors at runs exceed the known error, and matter, (columns,)."""
     return np.asarray(missed > SAFETY * error + FINE_GAP * study.widths(study.runs.values))
 
 
 def with_controls(study: Study, enclosed: DatedEnclosure | None) -> DatedEnclosure | None:
-    """Bounds with runs that they foretold."""
+    """Bounds with runs that they predicted."""
     if enclosed is None:
         return None
     values, now = study.runs.values, enclosed.enclosure
@@ -81,7 +81,7 @@ def enclosure(
     study: Study, surrogate: Surrogate, found: Extremes, error: Array, *, look: Look = "everywhere"
 ) -> Enclosure:
     """error: of the surrogate at runs that it had not seen, (columns,); found: its extremes; look: where the margin is
-    looked at: there only, where the surrogate is scanned as well, or in between too: each may reach farther
+    evaluated: there only, where the surrogate is scanned as well, or in between too: each may reach farther
     """
     values = study.runs.values
     lower, upper = values.min(axis=0), values.max(axis=0)
@@ -101,7 +101,7 @@ def enclose(study: Study, surrogate: Surrogate, error: Array) -> DatedEnclosure:
 
 
 def enclosure_of_cycles(study: Study, _: Surrogate, found: Extremes, error: Array) -> Enclosure:
-    """Bounds that runs attain, and outer ones by what a surrogate foretells at its extremes.
+    """Bounds that runs attain, and outer ones by what a surrogate predicts at its extremes.
 
     error: of the surrogate at runs that it had not seen, (columns,)
     """
@@ -116,7 +116,7 @@ def enclosure_of_cycles(study: Study, _: Surrogate, found: Extremes, error: Arra
 def _widened(
     study: Study, surrogate: Surrogate, found: Extremes, margin: Array, slope: int, look: Look
 ) -> tuple[Array, Array]:
-    """Where the surrogate is least and largest if it is off by its margin at the most, (columns,) each.
+    """Return the extremes of a surrogate that is off by its margin at the most, (columns,) each.
 
     The margin grows away from runs, so that an extreme may move off the surrogate's own: sought along the axes.
     """
@@ -131,7 +131,7 @@ def _widened(
         return np.minimum(slope * distance, 1.0), np.asarray(nearest, dtype=np.int64)
 
     def objective(at: Array) -> Array:
-        """Of the lower side of all columns, then of the upper one."""
+        """Return the widened lower side of all columns, then the upper one, negative."""
         share, run = away(at)
         return signs * surrogate.each(at, which) - margin[which] * share - misfit[run, which]
 
@@ -170,26 +170,25 @@ def _widened(
 WILKS = 93
 """Random runs between whose extremes 95 % of all lie with 95 % confidence: 1 - 0.95^n - n 0.05 0.95^(n-1) >= 0.95."""
 TESTED, TEST_SPACING = 1, 0.05
-"""Extremal points that are run for each parameter, and how far apart, where a surrogate of cycles tells the bounds."""
+"""Extremal points that are run for each parameter, and how far apart, where a surrogate of cycles gives the bounds."""
 ATTAINING, AT_ONCE = 16, 64
 """Times the fair number of runs that are made at most to attain bounds of a surrogate of cycles, so many at once."""
 ATTAINED = 0.1
-"""Share of the gap by which a run may lie inside what is foretold and count as attaining it."""
+"""Share of the gap by which a run may lie inside what is predicted and count as attaining it."""
 SEARCHES = 8
 """Searches for the extremes of a surrogate of cycles."""
 BELIEVED = 0.2
-"""Of the width: the largest gap of bounds that are told. A surrogate that misses more has not seen what is there."""
+"""Share of the width: the largest gap of bounds that are reported. A larger error shows a feature that was missed."""
 
 
 @dataclass(frozen=True, eq=False)
 class Bounds:
-    """Of every column. lower, upper: attained by runs or, at long times, by runs at the arguments named, to within the
-    error of the surrogate of cycles; lower_outer, upper_outer: no run is expected beyond, nan where
-    the method cannot tell, (columns,); at_lower, at_upper: values of the parameters there, (columns, parameters);
-    gap: the largest distance between both as a share of the width within the horizon, nan where it is not known;
-    horizon: the last instant up to which they meet [s], infinite if they always do; likely: where, with 95 %
-    confidence, 95 % of all runs lie if each value of the parameters is as likely as another, (2, columns), None within
-    the horizon
+    """Bounds of every column. lower, upper: attained by runs or, at long times, by runs at the arguments named, to
+    within the error of the surrogate of cycles; lower_outer, upper_outer: no run is expected beyond, nan where the
+    method cannot tell, (columns,); at_lower, at_upper: values of the parameters there, (columns, parameters); gap: the
+    largest distance between both as a share of the width within the horizon, nan where it is not known; horizon: the
+    last instant up to which they meet [s], infinite if they always do; likely: where, with 95 % confidence, 95 % of all
+    runs lie if each value of the parameters is as likely as another, (2, columns), None within the horizon
     """
 
     lower: Array
@@ -244,7 +243,8 @@ def bounds_of(study: Study, found: Found) -> Bounds:
 
 
 def likely(study: Study, bounds: Bounds) -> Bounds:
-    """Beyond the horizon: between the least and the largest of 93 random runs lie, with 95 % confidence, 95 % of all.
+    """Add a tolerance interval beyond the horizon: 95 % of all runs lie between the extremes of 93, with 95 %
+    confidence.
 
     Whatever the distribution of the answers (Wilks, Determination of sample sizes for setting tolerance limits, Annals
     of Mathematical Statistics 12, 1941); the intervals are taken as evenly likely.
@@ -294,7 +294,7 @@ def _controlled(study: Study, surrogate: Surrogate, error: Array) -> Array:
 def _tested(study: Study, surrogate: Surrogate, named: Extremes, error: Array) -> Array:
     """The error of a surrogate of cycles, or its error at the extremal points that promise most, which are run.
 
-    Elsewhere it may foretell well and still miss there: a ball that touches the ground has its least height in a cusp.
+    Elsewhere it may predict well and still miss there: a ball that touches the ground has its least height in a cusp.
     """
     runs, count = study.runs, TESTED * len(study.inputs)
     values = runs.values
@@ -313,7 +313,7 @@ def _tested(study: Study, surrogate: Surrogate, named: Extremes, error: Array) -
 
 
 def _attain(study: Study, surrogate: Surrogate, named: Extremes) -> None:
-    """Make the runs at the arguments of the extremes: one attains all that the surrogate foretells no better elsewhere.
+    """Make the runs at the arguments of the extremes: one attains all that the surrogate predicts no better elsewhere.
 
     Of all arguments that one is next whose run attains most; as many as the gap that is asked for takes, or `ATTAINING`
     times the fair number of runs.

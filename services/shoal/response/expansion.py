@@ -20,7 +20,7 @@ from shoal.response.study import Study
 from shoal.trajectory import Array
 
 RANK = 1e-13
-"""A direction that runs tell of less than this is left out."""
+"""Relative singular value below which a direction is left out."""
 SOLE = 1e-6
 """Of one: a run with an influence above this share is taken for one with this share."""
 
@@ -31,8 +31,8 @@ class Expansion:
 
     terms: degrees, (terms, parameters); coefficients: of the orthonormal products, (terms, columns); left_out: error at
     each run of the fit to all others, root of the mean square, (columns,); squares: the same of the squares of what
-    differs from the mean, over twice the deviation, (columns,); whole: whether the runs tell all of its terms: if not,
-    what is left out says nothing of what none of them tells
+    differs from the mean, over twice the deviation, (columns,); whole: whether the runs determine all of its terms: if
+    not, what is left out says nothing of the undetermined ones
     """
 
     inputs: Inputs
@@ -47,8 +47,8 @@ class Expansion:
         return np.asarray(self.inputs.basis(xi, self.terms) @ self.coefficients)
 
     def each(self, xi: Array, columns: IntArray) -> Array:
-        """One column at each place, (places,): as cheap as one answer instead of all."""
-        # Where nobody searches, the compiler is not loaded.
+        """Return one column at each place, (places,): as cheap as one answer instead of all."""
+        # Without a search, the compiler is not loaded.
         from shoal.response.one_column import one_column
 
         highest, terms, coefficients = self._laid
@@ -77,12 +77,12 @@ class Expansion:
 
     @property
     def mean(self) -> Array:
-        """Over all parameters, (columns,)."""
+        """Mean over all parameters, (columns,)."""
         return np.asarray(self.coefficients[0])
 
     @property
     def variance(self) -> Array:
-        """Over all parameters, (columns,)."""
+        """Variance over all parameters, (columns,)."""
         return np.asarray((self.coefficients[1:] ** 2).sum(axis=0))
 
 
@@ -114,7 +114,7 @@ WORSE = 2
 
 
 def choose_degree(study: Study, share: float, assess: Callable[[Expansion], Expansion]) -> Expansion:
-    """Of `degree`, or of each column's own among those that the runs carry: so many for every term, at least.
+    """Fit an expansion of `degree`, or of each column's best degree that the runs carry.
 
     judged: an expansion with what else is known of its error
     """
@@ -142,20 +142,20 @@ def choose_degree(study: Study, share: float, assess: Callable[[Expansion], Expa
 OUTER = 0.06
 """Share of the runs that are taken for the outermost."""
 PROBED = 1024
-"""Places at which the deviation is looked at."""
+"""Places at which the deviation is evaluated."""
 MISSED = 0.05
 """Share of a deviation that so few places may miss."""
 
 
 def outermost(inputs: Inputs, xi: Array) -> BoolArray:
-    """Which runs are, (runs,); none where all standardised variables are bounded, or where all are as far out."""
+    """Return which runs lie outermost, (runs,); none where all variables are bounded, or all runs lie as far out."""
     far = np.abs(xi[:, inputs.unbounded]).max(axis=1, initial=0.0)
     outer = np.asarray(far >= np.sort(far)[-max(1, int(OUTER * len(far)))])
     return outer & inputs.unbounded.any() & ~outer.all()
 
 
 def outwards(xi: Array, values: Array, found: Expansion) -> Expansion:
-    """With the error of the outermost runs where its terms are fitted to all others."""
+    """Return an expansion whose error includes that of the outermost runs, predicted by a fit to all others."""
     outer = outermost(found.inputs, xi)
     if not outer.any():
         return found

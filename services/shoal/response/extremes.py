@@ -74,7 +74,7 @@ def climb_down(objective: Objective, at: Array, value: Array) -> None:
 
 
 def _slopes(objective: Objective, at: Array, value: Array, searches: IntArray) -> tuple[Array, Array]:
-    """By differences of second order, inwards at a face, and curvatures along each axis, (searches, parameters).
+    """Return slopes by differences of second order, inwards at a face, and curvatures along each axis.
 
     Those of first order are off by half a difference times the curvature: across a narrow valley more than what is
     gained along it.
@@ -139,18 +139,18 @@ def _learn(inverse: Array, searches: IntArray, moved: Array, turned: Array) -> N
 LINE = 129
 """Places along each axis."""
 VALLEY_STEPS = 0.25, 0.02
-"""Lengths, in the distance of two places, in which each valley is looked at again."""
+"""Lengths, in the distance of two places, in which each valley is refined."""
 FOLLOWED = 4
 """Valleys along each axis that are followed, beside that of the place itself."""
 OWN_VALLEY = 0.25 * 2 / (LINE - 1)
 """A valley so near is the place's own."""
 BLOCK = 200_000
-"""Places that are looked at together."""
+"""Places that are evaluated together."""
 
 
 def search_valleys(objective: Objective, best: Array, at: Array) -> None:
     """Improve values, (searches,), and places, (searches, parameters), in place: downhill from the deepest valleys that
-    are foretold along each axis by the parabola through three neighbours.
+    are predicted along each axis by the parabola through three neighbours.
     """
     line = np.linspace(-1, 1, LINE)
     block = max(1, BLOCK // LINE)
@@ -161,7 +161,7 @@ def search_valleys(objective: Objective, best: Array, at: Array) -> None:
 
 
 def _search_axis(objective: Objective, best: Array, at: Array, axis: int, line: Array, some: IntArray) -> None:
-    """Of some searches, along one axis."""
+    """Search further valleys of some searches along one axis."""
     places = np.repeat(at[some], LINE, axis=0)
     places[:, axis] = np.tile(line, len(some))
     search, where = _valleys(objective(places, np.repeat(some, LINE)).reshape(len(some), LINE), line)
@@ -188,7 +188,7 @@ def _search_axis(objective: Objective, best: Array, at: Array, axis: int, line: 
 
 
 def _valleys(value: Array, line: Array) -> tuple[IntArray, Array]:
-    """Every valley: of which search, and about where, (valleys,) each; value: (searches, places)."""
+    """Return the search and the approximate place of every valley, (valleys,) each; value: (searches, places)."""
     left, middle, right = value[:, :-2], value[:, 1:-1], value[:, 2:]
     search, k = np.nonzero((middle <= left) & (middle <= right))
     three = np.stack([part[search, k] for part in (left, middle, right)])
@@ -205,10 +205,10 @@ def _vertex(value: Array, where: Array) -> tuple[Array, Array]:
 
 
 SCANNED, FEWER = 2048, 512
-"""Quasi-random places that are looked at within the box, and as many on its faces, beside corners and a grid; while a
+"""Quasi-random places that are scanned within the box, and as many on its faces, beside corners and a grid; while a
 study goes on, fewer and no grid."""
 MOST_CORNERS = 10
-"""Parameters up to which all corners are looked at."""
+"""Parameters up to which all corners are scanned."""
 ROUNDS, IDLE = 24, 4
 """Of searches, at most, and how many of them in a row have to find nothing new."""
 GRID = {1: 1001, 2: 41, 3: 15, 4: 7}
@@ -222,10 +222,10 @@ STEPS = 0.25, 0.1
 
 
 class Each(Protocol):
-    """One column at any place without a run."""
+    """Surrogate of one column at each place."""
 
     def each(self, xi: Array, columns: IntArray) -> Array:
-        """(places,)."""
+        """Return the column of each place, (places,)."""
         ...
 
 
@@ -233,7 +233,7 @@ class Surrogate(Each, Protocol):
     """Answers at any place without a run."""
 
     def __call__(self, xi: Array) -> Array:
-        """(places, columns)."""
+        """Return all columns, (places, columns)."""
         ...
 
 
@@ -251,7 +251,7 @@ class Extremes:
 
 
 def corners(parameters: int) -> Array:
-    """All 2^p corners of the box."""
+    """Return all 2^p corners of the box."""
     return np.array(list(product((-1.0, 1.0), repeat=parameters)))
 
 
@@ -291,7 +291,7 @@ def extremes(
 
 
 def _apart(scanned: Array, starts: int) -> list[Array]:
-    """As many parts: every n-th place of Sobol's sequence lies in one of its own, where n is a power of two."""
+    """Split places into parts: every n-th place of Sobol's sequence lies in one of its own, n a power of two."""
     return [scanned[start::starts] for start in range(starts)]
 
 
@@ -324,7 +324,7 @@ def _round(surrogate: Surrogate, sets: Sequence[Array], columns: int) -> tuple[A
 
 
 def in_parts(surrogate: Surrogate, scanned: Array, columns: int) -> Iterator[tuple[slice, Array]]:
-    """What a surrogate says at some of the places, (places, columns): so many at once as a processor has at hand."""
+    """Yield answers of a surrogate, (places, columns), in blocks that fit the processor's cache."""
     whole, part = (max(1, numbers // max(columns, 1)) for numbers in (HELD, AT_HAND))
     for k in range(0, len(scanned), whole):
         answers = surrogate(scanned[k : k + whole])
@@ -344,7 +344,7 @@ def _signed(surrogate: Surrogate, signs: Array, columns: IntArray) -> Objective:
 
 
 def _each(surrogate: Each, at: Array, columns: IntArray) -> Array:
-    """One column at each place, as many at once as a processor has at hand."""
+    """Return one column at each place, in blocks that fit the processor's cache."""
     parts = [slice(k, k + PLACES) for k in range(0, max(len(at), 1), PLACES)]
     return np.concatenate([surrogate.each(at[part], columns[part]) for part in parts])
 
@@ -367,7 +367,7 @@ def along(
 
 
 def places(parameters: int, seed: int | tuple[int, int], *, rough: bool = False) -> Array:
-    """Where a surrogate is looked at: all over the box and its faces and edges, its corners among them."""
+    """Return places all over the box and its faces and edges, its corners among them."""
     drawn = 2 * qmc.Sobol(parameters, rng=np.random.default_rng(seed)).random(FEWER if rough else SCANNED) - 1
     found = [drawn, np.clip(2 * drawn, -1, 1), np.zeros((1, parameters)), np.sign(drawn[:FEWER])]
     if parameters <= MOST_CORNERS:

@@ -133,7 +133,7 @@ SHOWN_REJECTED = _rejects(
 INTERVALS_UNDECIDED = _rejects(
     "interval-values-undecided",
     ResponseStatus.LIMIT,
-    "Interval values that were not looked at may change the reliability index by more than a quarter.",
+    "Interval values that were not examined may change the reliability index by more than a quarter.",
     "narrow the intervals, or " + _MORE,
 )
 NO_DESIGN_POINT = _rejects(
@@ -187,7 +187,7 @@ COARSE = _rejects(
 EXCEEDED_BETWEEN = Kind(
     "exceeded-between-instants",
     Severity.CAUTION,
-    "The run with the least margin exceeds the limit between the instants looked at.",
+    "The run with the least margin exceeds the limit between the instants examined.",
     "state more instants (--at)",
 )
 OPPOSITE = Kind(

@@ -25,7 +25,7 @@ Correlations = Mapping[tuple[str, str], float]
 
 @dataclass(frozen=True)
 class Joint:
-    """What parameters of one source know of each other.
+    """Joint knowledge of the parameters of one source.
 
     source: its name; correlations: of its parameters; ties: path -> expression in what `known` names and in constants;
     known: name in expressions -> name of the parameter; left: what is not taken from the source, and why
@@ -87,7 +87,7 @@ class Inputs:
 
     @property
     def names(self) -> list[str]:
-        """Of the parameters, in order."""
+        """Names of the parameters, in order."""
         return [one.name for one in self.parameters]
 
     def __len__(self) -> int:
@@ -95,7 +95,7 @@ class Inputs:
 
     @cached_property
     def random(self) -> BoolArray:
-        """Which parameters are random, (parameters,)."""
+        """Mask of the random parameters, (parameters,)."""
         return np.array([one.marginal.random for one in self.parameters], dtype=bool)
 
     @property
@@ -104,7 +104,7 @@ class Inputs:
         return bool(self.random.any() and not self.random.all())
 
     def some(self, which: BoolArray) -> Inputs:
-        """Of these parameters alone, (parameters,); correlated ones are all random."""
+        """Return the inputs of these parameters alone, (parameters,); correlated ones are all random."""
         kept = tuple(one for one, wanted in zip(self.parameters, which, strict=True) if wanted)
         names = {one.name for one in kept}
         pairs = {pair: value for pair, value in (self.correlations or {}).items() if names >= set(pair)}
@@ -139,16 +139,16 @@ class Inputs:
         return found
 
     def _standard(self, k: int) -> bool:
-        """Return whether xi of a parameter is a standard normal variable whatever its distribution."""
+        """Return whether xi of a parameter is a standard normal variable, whichever its distribution."""
         return k in self._correlated
 
     @property
     def unbounded(self) -> BoolArray:
-        """Which standardised variables are normal variables, (parameters,)."""
+        """Mask of the parameters whose xi is a normal variable, (parameters,)."""
         return np.array([self.recurrence(k) is HERMITE for k in range(len(self))], dtype=bool)
 
     def recurrence(self, k: int) -> Recurrence:
-        """Of the polynomials that are orthonormal under the measure of one parameter's standardised variable."""
+        """Return the recurrence of the polynomials that are orthonormal under the measure of one parameter's xi."""
         return HERMITE if self._standard(k) else self.parameters[k].marginal.basis
 
     def values(self, xi: Array) -> dict[str, Array]:
@@ -180,7 +180,7 @@ class Inputs:
 
     @property
     def _first(self) -> Array:
-        """What users state of a parameter over its value, (parameters,)."""
+        """Ratio of the stated value to that of the parameter, (parameters,)."""
         return np.array([next(iter(one.factors.values()), 1.0) for one in self.parameters])
 
     def named(self, xi: Array) -> Array:
@@ -223,11 +223,11 @@ class Inputs:
         return tuple(min(degree, len(self.recurrence(k).a), len(self.recurrence(k).b) - 1) for k in range(len(self)))
 
     def polynomials(self, k: int, xi: Array, degree: int) -> Array:
-        """Those of one parameter at its standardised variables, (runs,), from degree 0, (runs, degree + 1)."""
+        """Return the polynomials of one parameter at its xi, (runs,), from degree 0, (runs, degree + 1)."""
         return self.recurrence(k)(xi, degree)
 
     def basis(self, xi: Array, terms: Terms) -> Array:
-        """Every product of polynomials at every place, (runs, terms)."""
+        """Return every product of polynomials at every place, (runs, terms)."""
         highest = terms.max(axis=0)
         values_of, found = self.table(xi, highest), np.ones((len(terms), len(xi)))
         # Terms are rows, which is faster.

@@ -28,7 +28,7 @@ ALONE = 32
 
 
 def quantities(dimensions: int) -> tuple[str, ...]:
-    """What a study tells of every marker."""
+    """Return the quantities of every marker in a study."""
     return ("x", "y", "angle") if dimensions == 2 else ("x", "y", "z")
 
 
@@ -38,9 +38,9 @@ class ResponseModel:
 
     Quantities are x, y [m] and angle [rad]; in space x, y and z, where an angle in the plane z = 0 may jump.
 
-    columns: their number along each of the three; told: what is told instead, (lanes, columns), of the motion of a
+    columns: their number along each of the three; reduce: gives the answers, (lanes, columns), of the motion of a
     scene with some values of its lanes; keep: of the runs; fixed: values of parameters that are set in the scene, in
-    words, by which these are told apart; starts: counts the runs that start elsewhere than stated
+    words, by which these are distinguished; starts: counts the runs that start elsewhere than stated
     """
 
     scene: Scene
@@ -57,7 +57,7 @@ class ResponseModel:
 
     @property
     def quantities(self) -> tuple[str, ...]:
-        """What is told of every marker."""
+        """Quantities of every marker."""
         return quantities(self.scene.dimensions)
 
     @property
@@ -138,7 +138,7 @@ class ResponseModel:
         return self._lanes(motion, scene, those, lanes), motion.message
 
     def _impossible(self, scene: Scene, values: Mapping[str, Array], lanes: IntArray) -> str:
-        """Which values are refused, in words; empty where all of these lanes are, or none alone. By bisection."""
+        """Name the values that are refused; empty where all of these lanes are, or none alone. By bisection."""
 
         def refused(some: IntArray) -> bool:
             try:
@@ -209,7 +209,7 @@ def stable(scene: Scene, run: Callable[[Scene], Run]) -> tuple[Run, dict[str, fl
 
 
 def _columns(motion: Trajectory, _scene: Scene, _values: Mapping[str, Array]) -> Array:
-    """(lanes, instants * markers * 3)."""
+    """Return positions and angles of all markers, (lanes, instants * markers * 3)."""
     plane = motion.points.shape[2] == 2
     whole = np.concatenate([motion.points, motion.angles[:, :, None]], axis=2) if plane else motion.points
     return np.moveaxis(whole, -1, 0).reshape(motion.lanes, -1).copy()

@@ -1,4 +1,4 @@
-"""What is known about one parameter: an interval, or a distribution.
+"""Marginal knowledge of one parameter: an interval, or a distribution.
 
 Methods work in the standardised variable s of a parameter: its place in [-1, 1] for intervals and uniform
 distributions, the standard normal variable for normal and lognormal ones, the standardised value for others (arbitrary
@@ -23,7 +23,7 @@ QUADRATURE = 32, 64
 
 
 class Marginal(Protocol):
-    """What methods ask of a parameter."""
+    """Interface of the knowledge of a parameter."""
 
     @property
     def random(self) -> bool:
@@ -32,7 +32,7 @@ class Marginal(Protocol):
 
     @property
     def text(self) -> str:
-        """As the user wrote it."""
+        """Text as the user wrote it."""
         ...
 
     @property
@@ -56,7 +56,7 @@ class Marginal(Protocol):
 
 @dataclass(frozen=True)
 class Interval:
-    """Between two bounds, and no more is known."""
+    """Interval between two bounds, of which no more is known."""
 
     low: float
     high: float
@@ -70,7 +70,7 @@ class Interval:
         return 0.5 * (self.high - self.low)
 
     def quantile(self, x: Array) -> Array:
-        """Evenly over [-1, 1]."""
+        """Return quantiles of the uniform distribution over [-1, 1]."""
         return np.asarray(2 * x - 1)
 
     def value(self, s: Array) -> Array:
@@ -81,7 +81,7 @@ class Interval:
 
 @dataclass(frozen=True)
 class Uniform(Interval):
-    """Each value between two bounds as likely as another."""
+    """Uniform distribution between two bounds."""
 
     random = True
 
@@ -138,7 +138,7 @@ class Frozen:
 
     @cached_property
     def basis(self) -> Recurrence:
-        """By quadrature over the probability."""
+        """Orthonormal polynomials, by quadrature over the probability."""
         points, parts = QUADRATURE
         nodes, weights = np.polynomial.legendre.leggauss(points)
         # Finer towards both ends, where quantiles change fastest.
@@ -203,12 +203,12 @@ class Scaled:
 
     @property
     def text(self) -> str:
-        """In words."""
+        """Description."""
         return f"{self.marginal.text} scaled by {self.factor:g}"
 
     @property
     def basis(self) -> Recurrence:
-        """That of the distribution."""
+        """Orthonormal polynomials of the distribution."""
         return self.marginal.basis
 
     @property
@@ -217,7 +217,7 @@ class Scaled:
         return self.factor * self.marginal.tolerance
 
     def quantile(self, x: Array) -> Array:
-        """That of the distribution."""
+        """Return quantiles of the standardised distribution."""
         return self.marginal.quantile(x)
 
     def value(self, s: Array) -> Array:

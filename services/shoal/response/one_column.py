@@ -1,4 +1,4 @@
-"""One column of a sum of products of polynomials at each of many places, compiled: most of a search is spent here."""
+"""Compiled sum of products of polynomials, one column at each place: most of a search is spent here."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from shoal.trajectory import Array
 
 @njit(cache=True, error_model="numpy")
 def one_column(basis: Array, terms: Terms, coefficients: Array, columns: IntArray) -> Array:
-    """Of the columns asked for, (places,).
+    """Return the columns asked for, (places,).
 
-    told: polynomials, (degrees, parameters, places); terms: degrees, (terms, parameters); coefficients: (terms,
+    basis: polynomials, (degrees, parameters, places); terms: degrees, (terms, parameters); coefficients: (terms,
     columns); columns: (places,)
     """
     places, parameters = len(columns), terms.shape[1]

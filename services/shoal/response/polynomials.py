@@ -25,7 +25,7 @@ class Recurrence:
     b: Array
 
     def __call__(self, s: Array, degree: int) -> Array:
-        """All polynomials up to a degree at the places s, (places, degree + 1)."""
+        """Return all polynomials up to a degree at the places s, (places, degree + 1)."""
         return np.ascontiguousarray(np.moveaxis(self.rows(s, degree), 0, -1))
 
     def rows(self, s: Array, degree: int) -> Array:
@@ -54,7 +54,7 @@ HERMITE = Recurrence(np.zeros(CLASSICAL + 1), _k.copy())
 def of_measure(nodes: Array, weights: Array) -> Recurrence:
     """The recurrence of a measure given at nodes, by Stieltjes' procedure (Gautschi, 2004, section 2.2).
 
-    It ends where the nodes tell no more: n different nodes carry polynomials up to degree n - 1.
+    It ends where the nodes carry no more: n different nodes carry polynomials up to degree n - 1.
     """
     a, b = [], [1.0]
     now, before = np.ones(len(nodes)), np.zeros(len(nodes))
@@ -70,7 +70,7 @@ def of_measure(nodes: Array, weights: Array) -> Recurrence:
 
 
 def total_degree(parameters: int, degree: int) -> Terms:
-    """All products whose degrees sum up to at most `degree`, the lower ones first."""
+    """Return all products whose degrees sum up to at most `degree`, the lower ones first."""
     terms = [np.zeros((1, parameters), dtype=np.int64)]
     for _ in range(degree):
         more = (terms[-1][:, None] + np.eye(parameters, dtype=np.int64)[None]).reshape(-1, parameters)
@@ -79,7 +79,7 @@ def total_degree(parameters: int, degree: int) -> Terms:
 
 
 def tensor(parameters: int, degree: int) -> Terms:
-    """All products of degree up to `degree` in each parameter."""
+    """Return all products of degree up to `degree` in each parameter."""
     axes = np.meshgrid(*[np.arange(degree + 1)] * parameters, indexing="ij")
     return np.stack([axis.ravel() for axis in axes], axis=1)
 

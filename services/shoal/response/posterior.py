@@ -1,4 +1,4 @@
-"""What an identification knows of a machine as uncertain parameters: its estimate.json, or its draws.
+"""Uncertain parameters from the posterior of an identification: its estimate.json, or its draws.
 
 The estimate states a joint normal distribution, of the logarithm for parameters that are sought by it. Draws (the .nc
 of `identify --sample`) give every parameter their own distribution, and a Gaussian copula the correlation of their
@@ -67,7 +67,7 @@ def from_posterior(file: str, scene: Scene) -> list[UncertainParameter]:
 
 
 def _estimate(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
-    """Raises InputError."""
+    """Read an estimate. Raises InputError."""
     data = read_estimate(path, "vary", "joint")
     if data.get("status") != "ok":
         raise InputError(
@@ -77,7 +77,7 @@ def _estimate(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
 
 
 def _draws(path: Path) -> tuple[dict[str, Any], dict[str, str], dict[str, Array]]:
-    """Raises InputError."""
+    """Read draws. Raises InputError."""
     try:
         import xarray as xr
     except ModuleNotFoundError:
@@ -151,7 +151,7 @@ class _Draws:
 
 
 def _accepted(found: list[UncertainParameter], scene: Scene, file: str) -> None:
-    """Raises InputError where the scene has no such field, or refuses a value that is likely."""
+    """Check that the scene has these fields and accepts likely values. Raises InputError."""
     ends = [one.marginal.value(one.marginal.quantile(special.ndtr(np.array([-FAR, FAR])))) for one in found]
     for one, (low, high) in zip(found, ends, strict=True):
         for path in one.factors:

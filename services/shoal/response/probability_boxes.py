@@ -84,24 +84,24 @@ class Mean:
     of: Conditional
 
     def __call__(self, xi: Array) -> Array:
-        """(places, columns)."""
+        """Return all columns, (places, columns)."""
         return self.of.parts(xi)[0]
 
     def each(self, xi: Array, columns: IntArray) -> Array:
-        """(places,)."""
+        """Return one column at each place, (places,)."""
         return np.asarray(self.of.each(xi, columns)[:, 0])
 
 
 @dataclass(frozen=True)
 class Above:
-    """So many standard deviations from the mean; the deviation itself where `mean` is 0."""
+    """Multiple of the standard deviation above the mean; the deviation itself where `mean` is 0."""
 
     of: Conditional
     deviations: float = 1.0
     mean: float = 0.0
 
     def __call__(self, xi: Array) -> Array:
-        """(places, columns)."""
+        """Return all columns, (places, columns)."""
         first, *others = self.of.parts(xi)
         square = np.zeros_like(first)
         for part in others:
@@ -109,7 +109,7 @@ class Above:
         return np.asarray(self.mean * first + self.deviations * np.sqrt(square))
 
     def each(self, xi: Array, columns: IntArray) -> Array:
-        """(places,)."""
+        """Return one column at each place, (places,)."""
         found = self.of.each(xi, columns)
         return np.asarray(self.mean * found[:, 0] + self.deviations * np.sqrt((found[:, 1:] ** 2).sum(axis=1)))
 
@@ -119,7 +119,7 @@ class Share:
     """Share that some terms have of the variance of the random parameters at interval xi: a Sobol index.
 
     counted: the terms, without the constant, (terms - 1,); nothing: a variance beside which there is none to share,
-    (columns,); other: the share that is told where that is so, (columns,)
+    (columns,); other: the share to return where that is so, (columns,)
     """
 
     of: Conditional
@@ -128,12 +128,12 @@ class Share:
     other: Array
 
     def __call__(self, xi: Array) -> Array:
-        """(places, columns)."""
+        """Return all columns, (places, columns)."""
         squares = np.array([part**2 for part in self.of.parts(xi)[1:]])
         return self._share(squares[self.counted].sum(axis=0), squares.sum(axis=0), slice(None))
 
     def each(self, xi: Array, columns: IntArray) -> Array:
-        """(places,)."""
+        """Return one column at each place, (places,)."""
         squares = self.of.each(xi, columns)[:, 1:] ** 2
         return self._share(squares[:, self.counted].sum(axis=1), squares.sum(axis=1), columns)
 
@@ -151,7 +151,7 @@ class Quantile:
     drawn: Array
 
     def each(self, xi: Array, columns: IntArray) -> Array:
-        """(places,)."""
+        """Return one column at each place, (places,)."""
         found = self.of.each(xi, columns)
         block = max(1, BLOCK // len(self.drawn))
         parts = [
@@ -163,7 +163,7 @@ class Quantile:
 SEARCHED = 1024
 """Places at which an expansion is evaluated while extremes of its quantiles are sought."""
 GRID = {1: 33, 2: 9, 3: 5}
-"""Places along each axis that quantiles are looked at, by the number of intervals."""
+"""Places along each axis at which quantiles are evaluated, by the number of intervals."""
 ELSE = 64
 """Quasi-random ones where there are more intervals."""
 STEPS = 0.1, 0.02
@@ -171,12 +171,12 @@ STEPS = 0.1, 0.02
 BEYOND_HOPE = 0.1
 """Instants whose gap is above this share of the scatter lie beyond the horizon."""
 NOTHING = 0.01
-"""Of the largest deviation: at interval values with less, the shares of that are not looked at."""
+"""Of the largest deviation: at interval values with less, the shares of that are not evaluated."""
 COARSE, LITTLE = 0.05, 0.1
 """Share of a deviation above which its error calls for runs over the random parameters alone; at instants where it is
 below `LITTLE` of its largest, of that."""
 INTERVAL_VALUES, RUNS_EACH = 8, 128
-"""Interval values that are looked at beyond it, and runs at each."""
+"""Interval values that are sampled beyond it, and runs at each."""
 
 
 @dataclass(frozen=True)
@@ -207,9 +207,9 @@ class ProbabilityBoxes:
     estimates, so that only their outer bounds are to be printed; gap: the largest distance between outer bounds
     and extremes within the horizon, as a share of the scatter (the largest spread of the mean and deviation together);
     horizon: the last instant up to which they are known [s], infinite if they always are; places, inner: interval
-    values that were looked at beyond it, and runs at each; shares: of each random parameter the least and the largest
+    values that were sampled beyond it, and runs at each; shares: of each random parameter the least and the largest
     first and total Sobol index, (2 indices, 2 sides, random parameters, columns), nan beyond the horizon, where nothing
-    varies, of parameters that correlate, and where inner studies tell the deviation; std_gap: the same distance as
+    varies, of parameters that correlate, and where inner studies give the deviation; std_gap: the same distance as
     `gap` for the deviation alone, as a share of the deviation (see `std_gap`)
     """
 
@@ -225,7 +225,7 @@ class ProbabilityBoxes:
     std_gap: float = 0.0
 
     def named(self) -> dict[str, Ends]:
-        """Every statistic by its name."""
+        """Return every statistic by its name."""
         return {"mean": self.mean, "std": self.std, **dict(zip(map(_level, QUANTILES), self.quantiles, strict=True))}
 
 
@@ -234,7 +234,7 @@ def _level(share: float) -> str:
 
 
 def boxes_of(study: Study, found: Found) -> ProbabilityBoxes:
-    """From an expansion over all parameters and its error. Raises TimeIsUpError where there is none."""
+    """Return the boxes of an expansion over all parameters and its error. Raises TimeIsUpError where there is none."""
     if not isinstance(found.surrogate, Expansion) or found.error is None:
         raise TimeIsUpError
     of, error = Conditional(found.surrogate), SAFETY * found.error
@@ -268,7 +268,7 @@ def _std_gaps(study: Study, std: Ends) -> Array:
 
 
 def coarse(study: Study, std: Ends) -> BoolArray:
-    """Where the error of the deviation is too large a share of it, (columns,)."""
+    """Return where the error of the deviation is too large a share of it, (columns,)."""
     return np.asarray(_std_gaps(study, std) > COARSE)
 
 
@@ -305,12 +305,12 @@ def _shares(of: Conditional, study: Study, std: Extremes) -> Array:
 
 
 def _variance(found: Expansion, counted: BoolArray) -> Array:
-    """Of some terms, (columns,)."""
+    """Return the variance of some terms, (columns,)."""
     return np.asarray((found.coefficients[counted] ** 2).sum(axis=0))
 
 
 def scatter(study: Study, mean: Extremes, std: Extremes) -> Array:
-    """By how much the mean differs over the intervals, and the deviation: the largest of each group, (columns,)."""
+    """Return the largest spread of mean and deviation over the intervals in each group, (columns,)."""
     return study.largest(mean.upper - mean.lower + np.maximum(std.upper, 0.0), study.runs.values)
 
 
@@ -345,7 +345,7 @@ def _quantiles(of: Conditional, sides: list[Extremes], error: Array, seed: int) 
         # Each half of the sequence is spread as evenly as the whole; every second place is not.
         halves = [Quantile(of, share, half).each(both, np.tile(every, 2)) for half in np.split(many, 2)]
         low, high = (0.5 * (halves[0] + halves[1])).reshape(2, -1)
-        # What two halves of the places differ by tells what so many of them are off by.
+        # The difference of two halves of the places estimates the error of all.
         off = error + SAFETY * np.abs(halves[0] - halves[1]).reshape(2, -1).max(axis=0)
         swapped = low > high
         low, high = np.where(swapped, high, low), np.where(swapped, low, high)
@@ -368,7 +368,7 @@ def _improve(best: Array, at: Array, value: Array, place: Array) -> None:
 
 
 def _search(one: Each, best: Array, at: Array) -> None:
-    """Of one quantile, from the best places that were looked at; best: (2, columns), the upper side negative."""
+    """Search the extremes of one quantile from the best places so far; best: (2, columns), the upper side negative."""
     every = np.arange(best.shape[1])
     for side, sign in enumerate((1.0, -1.0)):
         for step in STEPS:
@@ -377,7 +377,7 @@ def _search(one: Each, best: Array, at: Array) -> None:
 
 
 def sampled(study: Study, boxes: ProbabilityBoxes) -> ProbabilityBoxes:
-    """Beyond the horizon: extremes over a few interval values of what runs there tell; outer bounds are not known."""
+    """Return boxes with extremes over a few interval values beyond the horizon, whose outer bounds are not known."""
     inputs, runs = study.inputs, study.runs
     intervals, random = inputs.some(~inputs.random), inputs.some(inputs.random)
     count = len(intervals)
@@ -398,7 +398,7 @@ def sampled(study: Study, boxes: ProbabilityBoxes) -> ProbabilityBoxes:
     named, late = intervals.named(given), study.instants > boxes.horizon
 
     def instead(known: Ends, ends_of: Array) -> Ends:
-        """told: (places, columns)."""
+        """Return a statistic with values beyond the horizon. ends_of: (places, columns)."""
         low, high, nothing = ends_of.argmin(axis=0), ends_of.argmax(axis=0), np.full(ends_of.shape[1], np.nan)
         new = Ends(ends_of.min(axis=0), ends_of.max(axis=0), nothing, nothing, named[low], named[high])
         return Ends(

@@ -97,7 +97,7 @@ def _select_model(
 
 
 def _keep(asked: Uncertain, scene: Scene, times: Array, end: float | None) -> Keep:
-    """Raises InputError."""
+    """Return the store of runs and the end of the time. Raises InputError."""
     if asked.checkpoint is None:
         return Keep(None, end)
     study = repr((scene.fingerprint, times.tolist(), asked.engine, versions(("shoal",))))

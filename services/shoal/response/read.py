@@ -90,7 +90,7 @@ def parameters(
 
 
 def by_name(vary: Mapping[str, Any] | Sequence[str]) -> dict[str, Any]:
-    """Name -> (low, high) or a text, of what users write. Raises InputError for what only an object tells."""
+    """Name -> (low, high) or a text, of what users write. Raises InputError for what only an object describes."""
     found = list(vary.items()) if isinstance(vary, Mapping) else [_split(text) for text in vary]
     for name, known in found:
         if not isinstance(known, str) and not (isinstance(known, Sequence) and len(known) == 2):
@@ -135,7 +135,7 @@ def _parameter(name: str, known: Any, scene: Scene) -> UncertainParameter:
 
 
 def _reaching(name: str, marginal: Marginal, low: float, high: float, error: InputError) -> str:
-    """Why a scene refuses an end: a distribution reaches further than its numbers tell."""
+    """Why a scene refuses an end: a distribution reaches further than its numbers suggest."""
     if not marginal.random:
         return str(error)
     below = "; truncated-normal(MEAN,SD,LOW,HIGH) and lognormal(MEAN,SD) stay above zero" if low < 0 < high else ""

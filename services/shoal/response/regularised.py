@@ -30,7 +30,7 @@ SIZES, RATIOS, NOISE = (-14.0, 6.0), (-7.0, 4.0), (-27.0, 0.0)
 FIRST = -1.0, -1.0, -20.0
 STEPS = 80
 TOLD = 320
-"""So many runs tell the values, and all the coefficients."""
+"""Runs to which the hyperparameters are fitted; all determine the coefficients."""
 TERMS = 1500
 """The largest ones, by their variances."""
 NOTHING = 1e-5
@@ -45,7 +45,7 @@ class Decay:
     noise: float
 
     def variances(self, degrees: tuple[int, ...]) -> list[Array]:
-        """Of the coefficients of each parameter's polynomials from degree 1 up to these, (degrees,) each."""
+        """Return the variances of each parameter's coefficients from degree 1 up to these, (degrees,) each."""
         found = []
         for (size, ratio), degree in zip(self.parameters, degrees, strict=True):
             k = np.arange(degree)
@@ -54,7 +54,7 @@ class Decay:
 
 
 def likeliest(inputs: Inputs, xi: Array, answers: Array, begun: Decay | None = None) -> Decay:
-    """Of one column, (runs,), or one for several, (runs, columns), by the likelihood with the size of each left free.
+    """Return the maximum-likelihood decay of columns, (runs,) or (runs, columns), each with a size of its own.
 
     begun: where the search begins
     """
@@ -109,7 +109,7 @@ def _unlikely(decay: Decay, bases: list[Array], y: Array) -> tuple[float, Array]
 
 
 def regularised(inputs: Inputs, xi: Array, values: Array, decay: Decay) -> Expansion:
-    """Of all columns, (runs, columns), with these variances."""
+    """Return the expansion of all columns, (runs, columns), with coefficients of these variances."""
     terms, variances = _largest(inputs, decay)
     basis, mean = inputs.basis(xi, terms), values.mean(axis=0)
     kernel = (basis * variances) @ basis.T
@@ -146,7 +146,7 @@ def _largest(inputs: Inputs, decay: Decay) -> tuple[Terms, Array]:
 
 
 def trimmed(found: Expansion) -> Expansion:
-    """Without the terms that are nothing beside the deviation of every column; the constant stays."""
+    """Return an expansion without terms that are negligible in every column; the constant stays."""
     shares = found.coefficients**2 / np.maximum(found.variance, 1e-300)
     kept = np.asarray((shares * len(shares) > NOTHING**2).any(axis=1))
     kept[0] = True

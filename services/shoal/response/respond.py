@@ -22,7 +22,7 @@ from shoal.response.problem import UncertainProblem
 from shoal.response.runs import CachedModel, Model, TimeIsUpError, TooManyRunsError
 from shoal.response.statistics import DRAWN as PLACES
 from shoal.response.statistics import QUANTILES, Statistics, either, masked, of_expansion, of_runs
-from shoal.response.study import Found, LinkedMoments, Study
+from shoal.response.study import Found, Study, TransformedMoments
 from shoal.trajectory import Array
 
 MIXED = "auto", "nested"
@@ -33,7 +33,7 @@ MOST = 20_000
 
 @dataclass(frozen=True)
 class ModelResponse:
-    """What is found of any model: bounds or statistics of its columns, and how."""
+    """Response of any model: bounds or statistics of its columns, and the runs and method behind them."""
 
     found: Found
     runs: CachedModel
@@ -43,18 +43,18 @@ class ModelResponse:
 
     @property
     def drawn(self) -> Array:
-        """Of random parameters: the answers of runs that are drawn from their distributions, (runs, columns)."""
+        """Answers of the runs that are drawn from the distributions of random parameters, (runs, columns)."""
         values = self.runs.values
         return values if self.found.drawn is None else values[len(values) - self.found.drawn :]
 
     @property
     def bounded(self) -> Bounds | ProbabilityBoxes | None:
-        """What has a horizon and a gap."""
+        """Bounds or boxes, which have a horizon and a gap."""
         return self.bounds or self.boxes
 
     @property
     def horizon(self) -> float:
-        """Up to when bounds hold [s], infinite if always."""
+        """Last instant up to which bounds hold [s], infinite if always."""
         return math.inf if self.bounded is None else self.bounded.horizon
 
 
@@ -112,7 +112,7 @@ def respond(
 
 
 def _broken_off(runs: CachedModel) -> Found:
-    """What is known when the time is up. Raises TimeIsUpError if that is nothing."""
+    """Return the result when the time is up. Raises TimeIsUpError without any run."""
     if runs.evaluations == 0:
         raise TimeIsUpError
     return Found("broken off when the time was up")
@@ -123,8 +123,8 @@ def _statistics(study: Study, found: Found) -> Statistics:
     known = sampled = of_runs(runs.values, found.indices, len(study.inputs))
     if isinstance(found.surrogate, Expansion):
         known = of_expansion(found.surrogate, study.inputs, found.error, len(runs.xi), study.seed)
-        if found.linked is not None:
-            known = _over(known, found.linked, study)
+        if found.transformed is not None:
+            known = _over(known, found.transformed, study)
         if found.errors is not None:
             known = replace(known, error=found.errors[0], std_error=found.errors[1])
         if found.indices is None:
@@ -135,15 +135,17 @@ def _statistics(study: Study, found: Found) -> Statistics:
     return masked(known, study.largest(np.nan_to_num(known.std), runs.values))
 
 
-def _over(known: Statistics, linked: LinkedMoments, study: Study) -> Statistics:
-    """With those of the columns that something else than the expansion tells."""
+def _over(known: Statistics, changed: TransformedMoments, study: Study) -> Statistics:
+    """Return statistics with those of the columns that a transformation predicts."""
     quantiles, first, total = known.quantiles.copy(), known.first.copy(), known.total.copy()
-    for columns, link in linked.links:
+    for columns, link in changed.links:
         answers = link(study.inputs.sobol(PLACES, study.seed + 1))
         quantiles[:, columns] = np.quantile(answers, QUANTILES, axis=0)
         if not study.inputs.correlations:
             first[:, columns], total[:, columns] = link.indices()
-    return replace(known, mean=linked.mean, std=np.sqrt(linked.variance), quantiles=quantiles, first=first, total=total)
+    return replace(
+        known, mean=changed.mean, std=np.sqrt(changed.variance), quantiles=quantiles, first=first, total=total
+    )
 
 
 def respond_markers(problem: UncertainProblem) -> ModelResponse:

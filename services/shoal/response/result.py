@@ -1,4 +1,4 @@
-"""The answer of a study: bounds with the runs that attain them, statistics, and how far either is to be believed."""
+"""Result of a study: bounds with the runs that attain them, statistics, and their errors."""
 
 from __future__ import annotations
 
@@ -35,18 +35,16 @@ BOUNDS = "lower", "upper", "lower_outer", "upper_outer"
 
 @dataclass(frozen=True, eq=False)
 class Response(Concluded):
-    """How the markers of a scene may move.
+    """Response of the markers of a scene to uncertain parameters.
 
     findings: about the answer, the decisive first; why: what the method did; times: instants [s]; markers: names;
-    horizon: up to when bounds hold [s]; bounds:
-    None if a parameter is random; statistics: None unless all are; boxes: bounds of the statistics, if only some are;
-    columns are (instants, markers, quantities) in this order;
-    errors: of the markers in extremal runs [m], empty where not estimated; model: the same of every column, by which
-    outer bounds and errors of statistics are wider, (columns,); stated: the scene with its model in the
-    middle; engine: its name; limits: of what must not happen;
-    allocation: tolerances that keep the limit, where they were asked for; finer: which bounds a finer mesh moves, where
-    a model was asked for; controls: runs all over the box of intervals that test what was foretold; elsewhere: how many
-    of the runs, those for limits among them, start elsewhere than the scene states
+    horizon: up to when bounds hold [s]; bounds: None if a parameter is random; statistics: None unless all are; boxes:
+    bounds of the statistics, if only some are; columns are (instants, markers, quantities) in this order; errors: of
+    the markers in extremal runs [m], empty where not estimated; model: the same of every column, by which outer bounds
+    and errors of statistics are wider, (columns,); stated: the scene with its model in the middle; engine: its name;
+    limits: of what must not happen; allocation: tolerances that keep the limit, where they were asked for; finer: which
+    bounds a finer mesh moves, where a model was asked for; controls: runs all over the box of intervals that test what
+    was predicted; elsewhere: how many of the runs, those for limits among them, start elsewhere than the scene states
     """
 
     findings: list[Finding]
@@ -83,17 +81,17 @@ class Response(Concluded):
 
     @property
     def mesh_error(self) -> float | None:
-        """Of the markers in extremal runs [m]; None where it was not estimated."""
+        """Mesh error of the markers in extremal runs [m]; None where it was not estimated."""
         return self.errors.estimates.get("mesh")
 
     @property
     def step_error(self) -> float | None:
-        """The same of the time step."""
+        """Error of the time step, as `mesh_error`."""
         return self.errors.estimates.get("time")
 
     @property
     def scatter(self) -> float:
-        """The widest bounds or the largest standard deviation of a coordinate [m]."""
+        """Widest bounds or largest standard deviation of a coordinate [m]."""
         if self.bounds is not None:
             sizes = self.bounds.upper - self.bounds.lower
         else:
@@ -104,7 +102,7 @@ class Response(Concluded):
 
     @property
     def grade(self) -> Grade:
-        """The colour of the answer: that of the known error as a share of what varies."""
+        """Grade of the known error as a share of what varies."""
         return self.errors.grade(self.ok, self.scatter * FAIR / GOOD)
 
     @property
@@ -114,14 +112,12 @@ class Response(Concluded):
 
     @property
     def unseen(self) -> float | None:
-        """A larger share of the box of intervals would have been seen by the runs of control with 95 % confidence, were
-        something else there than is told; None where there are no such runs.
-        """
+        """Share of the box that control runs may have missed with 95 % confidence; None without such runs."""
         return unseen(self.controls) if self.controls else None
 
     @property
     def axes(self) -> tuple[str, ...]:
-        """Those of the quantities that are coordinates [m]."""
+        """Quantities that are coordinates [m]."""
         return tuple(name for name in self.quantities if name in "xyz")
 
     @property
@@ -130,7 +126,7 @@ class Response(Concluded):
         return [one.name for one in self.inputs.parameters if one.marginal.random]
 
     def column(self, marker: str, quantity: str, of: Array) -> Array:
-        """What belongs to one marker and quantity over time; of: (..., columns) -> (..., instants)."""
+        """Return the values of one marker and quantity over time; of: (..., columns) -> (..., instants)."""
         shape = len(self.times), len(self.markers), len(self.quantities)
         whole = of.reshape(*of.shape[:-1], *shape)
         return np.asarray(whole[..., self.markers.index(marker), self.quantities.index(quantity)])
@@ -153,12 +149,12 @@ class Response(Concluded):
         return float(within.max()) if within.size else math.nan
 
     def missed(self, gap: float) -> dict[str, float]:
-        """Which markers' quantities have a larger gap than that, and theirs, worst first. Of intervals only."""
+        """Return the gaps larger than this by MARKER.QUANTITY, the worst first. Of intervals only."""
         entries = {f"{marker}.{name}": self.gap(marker, name) for marker in self.markers for name in self.quantities}
         return dict(sorted(((name, one) for name, one in entries.items() if one > gap), key=lambda pair: -pair[1]))
 
     def moved(self) -> dict[str, dict[str, Any]]:
-        """Of every marker's quantity the bound that a finer mesh moves furthest [m or rad], and when, sorted so."""
+        """Return the bound of every marker's quantity that a finer mesh moves furthest [m or rad], and when, sorted."""
         assert self.finer is not None
         found: dict[str, dict[str, Any]] = {}
         each = len(self.markers) * len(self.quantities)
@@ -172,7 +168,7 @@ class Response(Concluded):
         return dict(sorted(found.items(), key=lambda pair: -abs(pair[1]["by"])))
 
     def table(self) -> tuple[list[str], Array]:
-        """Header and rows over time of what is told of every marker, (instants, columns)."""
+        """Return header and rows over time of the results of every marker, (instants, columns)."""
         entries: dict[str, Array] = {}
         if self.bounds is not None:
             entries = {name: getattr(self.bounds, name) for name in BOUNDS}

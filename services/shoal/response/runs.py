@@ -21,11 +21,11 @@ SAME = 1e-9
 
 @dataclass(frozen=True)
 class Answers:
-    """Of several runs.
+    """Answers of several runs.
 
     values: (runs, columns); good: which may be believed, (runs,); repeated: how many took smaller steps; why: of the
     first that may not be believed; away: how far each starts from what is stated of its start, (runs, stated values),
-    None where nobody looks
+    None where starts are not counted
     """
 
     values: Array
@@ -43,7 +43,7 @@ class TooManyRunsError(Exception):
 class CachedModel:
     """A model with a memory: call it with standardised variables.
 
-    most: runs that it may make; progress: is told after every call how many there are; controls: runs all over the box
+    most: runs that it may make; progress: called after every call with their number; controls: runs all over the box
     that test a surrogate; named: runs at the arguments of its extremes, which attain the bounds; aside: runs that were
     set aside
     """
@@ -136,7 +136,7 @@ class CachedModel:
         return int(sum(np.sum(~good) for good in self._good))
 
     def describe_failed(self) -> str:
-        """Between which values of the parameters runs have failed, and those of the first, in words."""
+        """Describe the values of the parameters between which runs have failed, and those of the first."""
         bad = np.concatenate(self._xi)[~np.concatenate(self._good)]
         if not len(bad):
             return ""
@@ -149,12 +149,12 @@ class CachedModel:
 
     @property
     def xi(self) -> Array:
-        """Of the good runs, (runs, parameters)."""
+        """Standardised variables of the good runs, (runs, parameters)."""
         return np.concatenate(self._xi)[np.concatenate(self._good)]
 
     @property
     def values(self) -> Array:
-        """Of the good runs, (runs, columns)."""
+        """Answers of the good runs, (runs, columns)."""
         return np.concatenate(self._values)[np.concatenate(self._good)]
 
     @property
@@ -186,9 +186,9 @@ class Keep:
     def __call__(
         self, label: str, values: Mapping[str, Array], run: Callable[[Mapping[str, Array]], Answers], stated: int = 0
     ) -> Answers:
-        """What is known of these runs, else what making them tells. Raises TimeIsUpError.
+        """Return the answers of runs, from the file where they are known. Raises TimeIsUpError.
 
-        label: of what is told; stated: of so many values of the start runs tell how far they are away
+        label: of the answers; stated: number of start values whose distance is stored
         """
         points = np.stack(list(values.values()))
         known = None if self.memory is None else self.memory.recall(label, points)

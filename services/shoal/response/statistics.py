@@ -28,7 +28,7 @@ DRAWN = 2**14
 SURE = 2.0
 """Standard errors within which 95 % lie."""
 NOTHING = 1e-9
-"""A deviation below this share of the largest of its group has no shares to tell of."""
+"""A deviation below this share of the largest of its group has no Sobol indices."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ class Statistics:
 
 
 def of_expansion(found: Expansion, inputs: Inputs, error: Array | None, runs: int, seed: int) -> Statistics:
-    """Of a polynomial chaos; error: its own at runs it had not seen, (columns,)."""
+    """Return the statistics of a polynomial chaos; error: its own at runs it had not seen, (columns,)."""
     variance = found.variance
     first = np.full((len(inputs), len(variance)), np.nan)
     total = first.copy()
@@ -75,8 +75,8 @@ def of_expansion(found: Expansion, inputs: Inputs, error: Array | None, runs: in
 
 
 def of_runs(values: Array, indices: Array | None, parameters: int) -> Statistics:
-    """Of runs that are drawn from the distributions; indices: Sobol's, (2, parameters, columns)."""
-    # Runs that tell indices share their parameters with others.
+    """Return the statistics of runs drawn from the distributions; indices: Sobol's, (2, parameters, columns)."""
+    # Runs for indices share their parameters with others.
     independent = len(values) if indices is None else 2 * len(values) / (parameters + 2)
     unknown = np.full((2, parameters, values.shape[1]), np.nan)
     first, total = unknown if indices is None else indices
@@ -101,7 +101,7 @@ def either(first: BoolArray, one: Statistics, other: Statistics) -> Statistics:
 
 
 def masked(found: Statistics, scale: Array) -> Statistics:
-    """Without indices where the deviation is nothing beside that of other instants; scale: the largest, (columns,)."""
+    """Return statistics without indices where the deviation is negligible; scale: the largest deviation, (columns,)."""
     nothing = (scale == 0) | ~(found.std > NOTHING * scale)
     first, total = found.first.copy(), found.total.copy()
     first[:, nothing] = total[:, nothing] = np.nan
@@ -138,20 +138,20 @@ def jansen(values: Array, parameters: int) -> Array:
 
 
 HALVES = 2.0
-"""Times what a half tells apart from all."""
+"""Factor on the difference of a half from all: the error of half the runs is about twice that of the difference."""
 
 
 class Moments(Protocol):
-    """What an expansion tells, (columns,) each."""
+    """Interface of moments of all columns, (columns,) each."""
 
     @property
     def mean(self) -> Array:
-        """Over all parameters."""
+        """Mean over all parameters."""
         ...
 
     @property
     def variance(self) -> Array:
-        """Over all parameters."""
+        """Variance over all parameters."""
         ...
 
     @property
@@ -166,7 +166,7 @@ class Moments(Protocol):
 
 
 def moment_errors(study: Study, found: Moments, fitted: Callable[[Study], Moments]) -> tuple[Array, Array]:
-    """Within which mean and std lie with 95 % confidence, (columns,) each; fitted: what fewer runs tell."""
+    """Return the 95 % confidence errors of mean and std, (columns,) each; fitted: the expansion of fewer runs."""
     made, std, left_out = len(study.runs.xi), np.sqrt(found.variance), found.left_out
     squares = left_out if found.squares is None else np.maximum(found.squares, left_out)
     missing = np.divide(left_out**2, 2 * std, out=np.zeros_like(std), where=std > 0)

@@ -63,7 +63,7 @@ class Study:
         return max(LEAST, int(FAIR * size(len(self.inputs), 4)))
 
     def widths(self, values: Array) -> Array:
-        """Of the envelope of these answers, the largest of each group, (columns,)."""
+        """Return the largest width of the envelope of these answers in each group, (columns,)."""
         return self.largest(values.max(axis=0) - values.min(axis=0), values)
 
     def largest(self, spread: Array, values: Array) -> Array:
@@ -76,7 +76,7 @@ class Study:
     def beside(self, error: Array) -> Array:
         """The largest of each instant and its neighbours in the same group, (columns,).
 
-        Where runs happen to be foretold well, others need not be.
+        Where runs happen to be predicted well, others need not be.
         """
         found = error.copy()
         order = np.lexsort((self.instants, self.groups))
@@ -88,11 +88,11 @@ class Study:
         return found
 
     def intervals_only(self, method: str) -> None:
-        """Raises InputError where a parameter is random."""
+        """Check that no parameter is random. Raises InputError."""
         self._only(method, ~self.inputs.random, "an interval", "PATH=LOW:HIGH")
 
     def random_only(self, method: str) -> None:
-        """Raises InputError where a parameter is an interval."""
+        """Check that no parameter is an interval. Raises InputError."""
         self._only(method, self.inputs.random, "a distribution", "PATH~normal(MEAN,SD)")
 
     def _only(self, method: str, fits: BoolArray, wanted: str, form: str) -> None:
@@ -102,7 +102,7 @@ class Study:
 
 
 class Other(Protocol):
-    """What tells some columns better than an expansion."""
+    """Transformation that predicts some columns better than an expansion."""
 
     def __call__(self, xi: Array) -> Array:
         """Answers at any place without a run, (places, columns)."""
@@ -113,22 +113,22 @@ class Other(Protocol):
         ...
 
 
-class LinkedMoments(Protocol):
-    """Moments of all columns, and what tells some of them better than an expansion."""
+class TransformedMoments(Protocol):
+    """Moments of all columns, and transformations that predict some of them better than an expansion."""
 
     @property
     def links(self) -> Sequence[tuple[IntArray, Other]]:
-        """These columns, (n,), and what tells them."""
+        """These columns, (n,), and their transformations."""
         ...
 
     @property
     def mean(self) -> Array:
-        """Of all columns, (columns,)."""
+        """Mean of all columns, (columns,)."""
         ...
 
     @property
     def variance(self) -> Array:
-        """Of all columns, (columns,)."""
+        """Variance of all columns, (columns,)."""
         ...
 
 
@@ -153,14 +153,14 @@ class DatedEnclosure:
 
 @dataclass(frozen=True)
 class Found:
-    """What a method leaves beside its runs.
+    """Result of a method beside its runs.
 
     surrogate: of the answers, if it made one; error: what that is off by at runs it had not seen, (columns,); why: what
     it did, in words; indices: first and total Sobol indices by sampling, (2, parameters, columns);
     quantiles: that take the place of those of the runs, (levels, columns);
     errors: within which mean and deviation lie with 95 % confidence, (columns,) each;
     coarse: columns whose statistics are those of the runs, because the surrogate is not good enough there, (columns,);
-    linked: what tells some columns better than the surrogate; looked: its bounds, where the method knows them;
+    transformed: predicts some columns better than the surrogate; enclosed: its bounds, where the method knows them;
     drawn: of the last runs so many alone are drawn from the distributions, None: all are
     """
 
@@ -173,7 +173,7 @@ class Found:
     share: float = 0.0
     quantiles: Array | None = None
     errors: tuple[Array, Array] | None = None
-    linked: LinkedMoments | None = None
+    transformed: TransformedMoments | None = None
     enclosed: DatedEnclosure | None = None
     drawn: int | None = None
 

@@ -39,21 +39,21 @@ class Transformation(Protocol):
 
     @property
     def mean(self) -> Array:
-        """(columns,)."""
+        """Mean, (columns,)."""
         ...
 
     @property
     def variance(self) -> Array:
-        """(columns,)."""
+        """Variance, (columns,)."""
         ...
 
     @property
     def beyond(self) -> Array:
-        """Part of the deviation that no run can tell of, (columns,)."""
+        """Part of the deviation that no run shows, (columns,)."""
         ...
 
     def __call__(self, xi: Array) -> Array:
-        """(places, columns)."""
+        """Return the answers, (places, columns)."""
         ...
 
     def indices(self) -> Array:
@@ -61,21 +61,21 @@ class Transformation(Protocol):
         ...
 
     def some(self, which: BoolArray) -> Self:
-        """In some of its columns, (columns,)."""
+        """Return the transformation of some columns, (columns,)."""
         ...
 
     def again(self, study: Study, fitted: Fitted) -> Self:
-        """Of the same kind, for other runs of the same columns."""
+        """Fit a transformation of the same kind to other runs of the same columns."""
         ...
 
 
 def columns_of(study: Study, columns: IntArray) -> Study:
-    """Of these columns alone."""
+    """Return the study of these columns alone."""
     return with_answers(study, study.inputs, study.runs.xi, study.runs.values[:, columns])
 
 
 def with_answers(study: Study, inputs: Inputs, xi: Array, values: Array) -> Study:
-    """With other answers."""
+    """Return a study with other answers."""
     good = np.ones(len(xi), dtype=bool)
     return replace(study, runs=CachedModel(study.runs.model, inputs, len(xi), None, 0, "", [xi], [values], [good]))
 
@@ -127,7 +127,7 @@ class Combined:
 
 
 def combined(inputs: Inputs, way: Array) -> Combined:
-    """Of the standardised variables, by the convolution of their distributions on a grid."""
+    """Combine standardised variables: convolution of their distributions on a grid."""
     grid, step = np.linspace(-SPAN, SPAN, NODES, endpoint=False, retstep=True)
     spectrum = np.ones(NODES // 2 + 1, dtype=complex)
     for k, part in enumerate(way):
@@ -151,7 +151,7 @@ TILTED = 2**13
 INDEX_PLACES = 2**12
 """And for shares, for every parameter."""
 REACHED = 5.0
-"""Deviations of a normal variable; what is further out is told by no run."""
+"""Deviations of a normal variable; what is further out no run shows."""
 BEYOND = 1e-3
 """Share of the deviation that may lie there."""
 
@@ -166,39 +166,39 @@ class Exponential:
     text = "an expansion of their logarithm"
 
     def __call__(self, xi: Array) -> Array:
-        """(places, columns)."""
+        """Return the answers, (places, columns)."""
         return np.asarray(self.signs * np.exp(self.logarithm(xi)))
 
     def again(self, study: Study, fitted: Fitted) -> Exponential:
-        """For other runs."""
+        """Fit to other runs."""
         return _exponential(study, fitted)
 
     @property
     def mean(self) -> Array:
-        """(columns,)."""
+        """Mean, (columns,)."""
         return np.asarray(self.signs * self._moments[0])
 
     @property
     def variance(self) -> Array:
-        """(columns,)."""
+        """Variance, (columns,)."""
         return self._moments[1]
 
     @property
     def beyond(self) -> Array:
-        """What places far out along a parameter add, (columns,), if it is something."""
+        """Contribution of places far out along a parameter, (columns,), if it is not negligible."""
         whole, near = (np.sqrt(second / first**2 - 1) for first, second in map(self._products, (REACH, REACHED)))
         apart = np.sqrt(self.variance) * np.abs(1 - np.divide(near, whole, out=np.ones_like(near), where=whole > 0))
         return np.where(apart > BEYOND * np.sqrt(self.variance), apart, 0.0)
 
     def some(self, which: BoolArray) -> Exponential:
-        """In some of its columns."""
+        """Return some of the columns."""
         of = self.logarithm
         squares = None if of.squares is None else of.squares[which]
         logarithm = replace(of, coefficients=of.coefficients[:, which], left_out=of.left_out[which], squares=squares)
         return Exponential(logarithm, self.signs[which], self.seed)
 
     def indices(self) -> Array:
-        """In closed form for the functions of one parameter each; what others add is sampled."""
+        """Return indices in closed form for the functions of one parameter each; products are sampled."""
         inputs, (first, second) = self.logarithm.inputs, self._parts(REACH)
         own = second / first**2
         whole = np.prod(own, axis=0)
@@ -225,7 +225,7 @@ class Exponential:
         return np.asarray(np.prod(self._parts(reach), axis=1))
 
     def _others(self, order: int) -> Array:
-        """By how much terms of several parameters multiply the mean of this power, (columns,).
+        """Return the factor of terms of several parameters in the mean of this power, (columns,).
 
         It is sampled where the functions of one parameter have most of that mean.
         """
@@ -292,7 +292,7 @@ def _exponential(study: Study, fitted: Fitted) -> Exponential:
 def exponentials(
     study: Study, found: Expansion, wanted: IntArray, fitted: Fitted
 ) -> Sequence[tuple[IntArray, Exponential]]:
-    """Of the columns with one sign."""
+    """Return exponentials of the columns with one sign."""
     values = study.runs.values[:, wanted]
     columns = wanted[(values > 0).all(axis=0) | (values < 0).all(axis=0)]
     return [(columns, _exponential(columns_of(study, columns), fitted))] if len(columns) else []
@@ -312,7 +312,7 @@ TURNS = 12
 
 @dataclass(frozen=True)
 class Ridge:
-    """One column as an expansion along a direction of the standardised variables.
+    """Ridge function: one column as an expansion along a direction of the standardised variables.
 
     way: the direction, of length 1, (parameters,); decay: of the coefficients, where that is what holds them
     """
@@ -324,25 +324,25 @@ class Ridge:
     text = "a function of one direction"
 
     def __call__(self, xi: Array) -> Array:
-        """(places, 1)."""
+        """Return the answers, (places, 1)."""
         return self.along((_standardised(self.inputs, xi) @ self.way)[:, None])
 
     def again(self, study: Study, fitted: Fitted) -> Ridge:
-        """For other runs."""
+        """Fit to other runs."""
         return _ridge(study, fitted, _turned_best(study, [self.way])[0], self.decay)
 
     @property
     def mean(self) -> Array:
-        """(1,)."""
+        """Mean, (1,)."""
         return self.along.mean
 
     @property
     def variance(self) -> Array:
-        """(1,)."""
+        """Variance, (1,)."""
         return self.along.variance
 
     def indices(self) -> Array:
-        """In closed form for normal variables, by Mehler's formula, else sampled."""
+        """Return indices in closed form for normal variables, by Mehler's formula, else sampled."""
         inputs = self.inputs
         if not inputs.unbounded.all():
             places = designs(inputs, INDEX_PLACES, len(self.along.terms))
@@ -352,17 +352,17 @@ class Ridge:
         return np.array([own**degrees @ parts, 1 - (1 - own) ** degrees @ parts])[:, :, None]
 
     def some(self, which: BoolArray) -> Ridge:
-        """It has one column."""
+        """Return itself: there is one column."""
         return self
 
     @property
     def beyond(self) -> Array:
-        """The expansion's own error, which tells of it, (1,)."""
+        """The expansion's own error, which includes it, (1,)."""
         return self.along.left_out
 
 
 def _turned_best(study: Study, ways: Sequence[Array]) -> tuple[Array, float]:
-    """From the best of some directions, and what polynomials along it leave of the answers, root of the mean square."""
+    """Turn the best of some directions; also returns the root-mean-square residual of polynomials along it."""
     z, y, found = _standardised(study.inputs, study.runs.xi), study.runs.values[:, 0], []
     for way in ways:
         turned = way / np.linalg.norm(way)
@@ -407,7 +407,7 @@ def _turned(z: Array, y: Array, way: Array, degree: int) -> tuple[Array, float]:
 
 
 def _rest(z: Array, y: Array, way: Array, degree: int) -> tuple[float, Array]:
-    """What polynomials along this direction leave, sum of squares, and the step that should leave least."""
+    """Return the sum of squared residuals of polynomials along a direction, and the Gauss-Newton step."""
     u, runs = z @ way, len(y)
     polynomials = of_measure(u, np.full(runs, 1 / runs))
     basis = polynomials(u, degree)
@@ -422,12 +422,12 @@ def _rest(z: Array, y: Array, way: Array, degree: int) -> tuple[float, Array]:
 
 
 def _standardised(inputs: Inputs, xi: Array) -> Array:
-    """With mean 0 and deviation 1, both (runs, parameters)."""
+    """Return variables of mean 0 and deviation 1, both (runs, parameters)."""
     return np.stack([inputs.polynomials(k, xi[:, k], 1)[:, 1] for k in range(len(inputs))], axis=1)
 
 
 def ridges(study: Study, found: Expansion, wanted: IntArray, fitted: Fitted) -> Sequence[tuple[IntArray, Ridge]]:
-    """Of one column each, those that the expansion tells worst first."""
+    """Return ridge functions of one column each, the columns that the expansion predicts worst first."""
     inputs, runs = study.inputs, study.runs
     if len(inputs) == 1 or len(runs.xi) < 2 * (len(inputs) + ALONG_DEGREES[-1]):
         return []
@@ -452,7 +452,7 @@ def ridges(study: Study, found: Expansion, wanted: IntArray, fitted: Fitted) -> 
 
 
 def _slopes(found: Expansion, xi: Array) -> Array:
-    """By every place, (runs, parameters, columns)."""
+    """Return slopes by every standardised variable, (runs, parameters, columns)."""
     inputs, h = found.inputs, 1e-5
     at, slopes = found(xi), []
     for k in range(len(inputs)):
@@ -472,9 +472,9 @@ KINDS: list[Kind] = [exponentials, ridges]
 
 @dataclass(frozen=True)
 class Transformed:
-    """An expansion, and what tells some columns better.
+    """Expansion, and transformations that predict some columns better.
 
-    links: the columns, (n,), and what tells them; left_out, squares: as those of `Expansion`
+    links: the columns, (n,), and their transformations; left_out, squares: as those of `Expansion`
     """
 
     plain: Expansion
@@ -484,7 +484,7 @@ class Transformed:
 
     @property
     def mean(self) -> Array:
-        """Over all parameters, (columns,)."""
+        """Mean over all parameters, (columns,)."""
         found = self.plain.mean.copy()
         for columns, link in self.links:
             found[columns] = link.mean
@@ -492,7 +492,7 @@ class Transformed:
 
     @property
     def variance(self) -> Array:
-        """Over all parameters, (columns,)."""
+        """Variance over all parameters, (columns,)."""
         found = self.plain.variance.copy()
         for columns, link in self.links:
             found[columns] = link.variance
@@ -506,7 +506,7 @@ class Transformed:
 
     @property
     def why(self) -> str:
-        """In words, which columns are told otherwise."""
+        """Description of the columns that are transformed."""
         texts = dict.fromkeys(link.text for _, link in self.links)
         counts = {text: sum(len(which) for which, link in self.links if link.text == text) for text in texts}
         return "".join(f"; {count} of {len(self.left_out)} answers by {text}" for text, count in counts.items())
@@ -519,7 +519,7 @@ def untransformed(found: Expansion) -> Transformed:
 
 
 def transformed(study: Study, found: Expansion, wanted: BoolArray, fitted: Fitted) -> Transformed:
-    """With links in those of the wanted columns, (columns,), that they tell clearly better."""
+    """Transform those of the wanted columns, (columns,), that are predicted clearly better so."""
     plain_first = untransformed(found)
     for kind in KINDS:
         for columns, link in kind(study, found, np.flatnonzero(wanted), fitted):
@@ -535,7 +535,7 @@ def compared(plain_first: Transformed, found: Expansion) -> Transformed:
 def _better(
     study: Study, plain_first: Transformed, columns: IntArray, link: Transformation, fitted: Fitted
 ) -> Transformed:
-    """With the link in those of these columns in which it is clearly better."""
+    """Apply a transformation in those of these columns in which it is clearly better."""
     part, left_out, squares = (
         columns_of(study, columns),
         np.full(len(plain_first.left_out), np.inf),
@@ -552,7 +552,7 @@ def _better(
 def _with(
     plain_first: Transformed, links: Iterable[tuple[IntArray, Transformation]], left_out: Array, squares: Array
 ) -> Transformed:
-    """With links where their error, (columns,), is clearly smaller."""
+    """Apply transformations where their error, (columns,), is clearly smaller."""
     better = left_out < CLEARLY * plain_first.left_out
     kept = [*_columns_where(plain_first.links, ~better), *_columns_where(links, better)]
     left_out, squares = (
@@ -564,7 +564,7 @@ def _with(
 def _columns_where(
     links: Iterable[tuple[IntArray, Transformation]], wanted: BoolArray
 ) -> Iterator[tuple[IntArray, Transformation]]:
-    """In those of their columns that are wanted, (columns,)."""
+    """Yield transformations of those of their columns that are wanted, (columns,)."""
     for columns, link in links:
         which = wanted[columns]
         if which.any():
@@ -572,7 +572,7 @@ def _columns_where(
 
 
 def _missed(study: Study, link: Transformation, fitted: Fitted) -> tuple[Array, Array]:
-    """What fits to other runs miss of each, (runs, columns), and the error of the outermost ones, (columns,)."""
+    """Return leave-out errors of each run, (runs, columns), and the error of the outermost ones, (columns,)."""
     runs = study.runs
     missed = np.empty_like(runs.values)
     for left in np.array_split(np.arange(len(missed)), FOLDS):
@@ -583,7 +583,7 @@ def _missed(study: Study, link: Transformation, fitted: Fitted) -> tuple[Array, 
 
 
 def _prediction_errors(study: Study, link: Transformation, fitted: Fitted, left: IntArray) -> Array:
-    """What a fit without them misses of these runs."""
+    """Return the errors of a fit without these runs in predicting them."""
     kept = np.ones(len(study.runs.xi), dtype=bool)
     kept[left] = False
     other = link.again(replace(study, runs=study.runs.part(kept)), fitted)

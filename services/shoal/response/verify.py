@@ -1,8 +1,8 @@
 """Verification of a study by more careful runs: known errors of decisive runs, and bounds on a finer mesh.
 
 Errors of time step, mesh and neglected theory are known of every marker's quantity over time. What more careful runs
-move a place by is what bounds, means and quantiles of the study may be off by, whatever its own method says: outer
-bounds and errors of statistics take it.
+move a place by is what bounds, means and quantiles of the study may be off by, apart from the error of its own method:
+outer bounds and errors of statistics take it.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ REPEATED = 48
 
 @dataclass(frozen=True)
 class Finer:
-    """What the finer mesh says at the same values of the parameters, less what the mesh of the study says.
+    """Change of the bounds on a finer mesh at the same values of the parameters.
 
     mesh: path -> value; runs: repeated; lower, upper: of every column, nan where the run is not among them, (columns,);
     failed: those that failed on the finer mesh
@@ -52,7 +52,7 @@ class Finer:
     upper: Array
 
     def most(self, columns: BoolArray) -> tuple[float, int, str] | None:
-        """Of these columns, (columns,), the bound that moves furthest: by how much, in which column, and its side."""
+        """Return the bound of these columns, (columns,), that moves furthest: by how much, its column and side."""
         found: list[tuple[float, int, str]] = []
         for side, moved in (("lower", self.lower), ("upper", self.upper)):
             known = np.flatnonzero(columns & np.isfinite(moved))
@@ -62,13 +62,13 @@ class Finer:
         return max(found, key=lambda one: abs(one[0]), default=None)
 
     def to_json(self) -> dict[str, Any]:
-        """Without the columns."""
+        """Return plain data, without the columns."""
         known = np.isfinite(np.concatenate([self.lower, self.upper]))
         return {"mesh": self.mesh, "runs": self.runs, "failed": self.failed, "share_of_bounds": plain(known.mean())}
 
 
 def repeat_on_finer_mesh(machine: ResponseModel, runs: CachedModel) -> Finer | None:
-    """None where nothing bends. Raises InputError."""
+    """Repeat decisive runs on a finer mesh; None where nothing bends. Raises InputError."""
     mesh = refined(machine.scene, 2)
     if not mesh:
         return None
@@ -97,7 +97,7 @@ NEGLIGIBLE = 0.01
 
 @dataclass(frozen=True, eq=False)
 class ModelErrors:
-    """budget: of the markers, the largest of the runs that were looked at; columns: of every column, all sources
+    """budget: of the markers, the largest of the runs that were repeated; columns: of every column, all sources
     together, (columns,); findings: that a more careful run rejects the model
     """
 
@@ -141,7 +141,7 @@ class ModelErrors:
 
 
 def unestimated(machine: ResponseModel) -> ModelErrors:
-    """None are known."""
+    """Return errors of which none is known."""
     return ModelErrors(ErrorBudget(), np.zeros(int(np.prod(machine.columns))))
 
 
@@ -170,7 +170,7 @@ def _columns(verification: Verification, count: int) -> Array:
 
 @dataclass(frozen=True)
 class _Nothing:
-    """Up to which errors of single runs are nothing beside what the runs differ by; in words what that is.
+    """Errors of single runs that are negligible beside the spread of the runs.
 
     length [m], angle [rad]; name: of the widest coordinate
     """

@@ -1,4 +1,4 @@
-"""The worst case as a scene of its own: of a limit, or of a bound of a marker."""
+"""Worst case of a limit, or of a bound of a marker, as a scene of its own."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ class Worst:
     shown: VerifiedRun
 
     def save(self, path: Path) -> None:
-        """As YAML. Raises ComputationError."""
+        """Write the scene as YAML. Raises ComputationError."""
         with whole(path) as part:
             part.write_text(as_yaml(self.scene.model_dump(mode="json", exclude_unset=True)))
 
 
 def worst(found: Response, of: str = "") -> list[Worst]:
-    """Of one limit or bound, else of every limit, else of the widest bound. Raises InputError.
+    """Return the worst cases of one limit or bound, else of every limit, else of the widest bound. Raises InputError.
 
     The runs of limits have been verified as the study was asked to; that of a bound is verified here.
     """
@@ -54,7 +54,7 @@ def worst(found: Response, of: str = "") -> list[Worst]:
 
 
 def require_case(of: str, limits: Sequence[Limit], scene: Scene, parameters: Sequence[UncertainParameter]) -> None:
-    """Raises InputError for what can be no case of a study of a scene with limits, before it is made."""
+    """Check that a study of a scene with limits has such a case, before it is made. Raises InputError."""
     texts = [one.text for one in limits]
     if not of or of in texts:
         return

@@ -63,7 +63,7 @@ def model_of(rng: np.random.Generator) -> ForwardModel:
 
 
 def astray(model: ForwardModel, rng: np.random.Generator) -> Iterator[tuple[float, float, bool, bool]]:
-    """For each fault, size and parameter: the size, the ratio, and whether either interval holds the truth."""
+    """Return, for each fault, size and parameter: the size, the ratio, and whether either interval holds the truth."""
     values = [model.scene.value(p.path) for p in model.problem.parameters.values() if p.path]
     truth = model.parameters.to_vector(np.array(values))
     seen = sensitivity(model, truth)
@@ -92,7 +92,7 @@ def astray(model: ForwardModel, rng: np.random.Generator) -> Iterator[tuple[floa
 
 
 def _effects(model: ForwardModel, truth: Array, residual: Array) -> Iterator[Array]:
-    """What each fault changes of the rows, to first order."""
+    """Return the first-order changes of the rows by each fault."""
     sought = {str(parameter.path) for parameter in model.problem.parameters.values()}
     for candidate in (*of_measurement(model), *of_machine(model)):
         if candidate.paths & sought:

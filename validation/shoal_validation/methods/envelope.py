@@ -46,11 +46,11 @@ class Parted:
     parts: int
 
     def __call__(self, xi: Array) -> Array:
-        """(places, columns)."""
+        """Return all columns, (places, columns)."""
         return _joined(self.expansion(xi).reshape(len(xi), self.parts, 3, -1))
 
     def each(self, xi: Array, columns: IntArray) -> Array:
-        """(places,)."""
+        """Return one column at each place, (places,)."""
         count = self.expansion.coefficients.shape[1] // (3 * self.parts)
         told = [self.expansion.each(xi, columns + count * k) for k in range(3 * self.parts)]
         return _joined(np.stack(told, axis=1).reshape(len(xi), self.parts, 3, 1))[:, 0]
@@ -71,7 +71,7 @@ def rs_lmd(study: Study) -> Found:
 
 
 def _by_parts(study: Study, method: str, parts: Parts) -> Found:
-    """Raises InputError."""
+    """Fit amplitude and phase of all runs. Raises InputError."""
     study.intervals_only(method)
     refuse_without_course(study, method)
     parameters, degree = len(study.inputs), study.degree or DEGREE
@@ -88,7 +88,7 @@ def _by_parts(study: Study, method: str, parts: Parts) -> Found:
 
 
 def _told(times: Array, course: Array, when: Array, parts: Parts) -> Array:
-    """(parts, 3, columns)."""
+    """Return the parts of a course at the instants, (parts, 3, columns)."""
     of = [parts(times, signal) for signal in course.T]
     at = [make_interp_spline(times, one, 3, axis=-1)(when) for one in of]
     return np.stack(at, axis=-1).reshape(*at[0].shape[:2], -1)

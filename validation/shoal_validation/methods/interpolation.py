@@ -36,11 +36,11 @@ class Process:
     left_out: Array
 
     def __call__(self, xi: Array) -> Array:
-        """The answers at these places."""
+        """Return all columns at these places."""
         return np.asarray(self.middle + _correlation(xi, self.xi, self.length) @ self.weights)
 
     def each(self, xi: Array, columns: IntArray) -> Array:
-        """One column at each place."""
+        """Return one column at each place."""
         correlation = _correlation(xi, self.xi, self.length)
         return np.asarray(self.middle[columns] + np.einsum("ij,ji->i", correlation, self.weights[:, columns]))
 
@@ -77,11 +77,11 @@ class Spline:
     spline: RBFInterpolator
 
     def __call__(self, xi: Array) -> Array:
-        """The answers at these places."""
+        """Return all columns at these places."""
         return np.asarray(self.spline(xi))
 
     def each(self, xi: Array, columns: IntArray) -> Array:
-        """One column at each place."""
+        """Return one column at each place."""
         found = np.empty(len(xi))
         for k in range(0, len(xi), 256):
             some = slice(k, k + 256)

@@ -27,7 +27,7 @@ HALVINGS = 20
 
 
 def maximum_entropy(study: Study) -> Found:
-    """From `degree` moments, else four, of `count` quasi-random runs. Raises InputError."""
+    """Return quantiles from `degree` moments, else four, of `count` quasi-random runs. Raises InputError."""
     study.random_only("maximum-entropy")
     moments = study.degree or MOMENTS
     found = of_distributions(study, min(study.count or COUNT, study.runs.left))

@@ -28,7 +28,7 @@ CENTRES = 24
 
 @dataclass
 class Searches:
-    """Of every goal (lower bounds of all columns, then upper ones, all to be maximised) and start.
+    """Searches of every goal (lower bounds of all columns, then upper ones, all to be maximised) and start.
 
     places: (starts, goals, parameters); best: what is reached there; arms: of the next star; both (starts, goals)
     """
@@ -54,7 +54,7 @@ def optimise(study: Study) -> Found:
 
 
 def _goals(values: Array) -> Array:
-    """What is to be maximised, (runs, goals)."""
+    """Return the goals to be maximised, (runs, goals)."""
     return np.concatenate([-values, values], axis=1)
 
 
@@ -71,7 +71,7 @@ def _begun(xi: Array, goals: Array) -> Searches:
 
 
 def _poll(study: Study, searches: Searches, most: int) -> None:
-    """One round: stars around the places with the longest arms, then the tops of the parabolas through them."""
+    """Run one round: stars around the places with the longest arms, then the tops of the parabolas through them."""
     runs, parameters = study.runs, len(study.inputs)
     stars = _stars(searches)
     made = len(runs.xi)
@@ -120,7 +120,7 @@ def _stars(searches: Searches) -> list[tuple[Array, float, Array]]:
 
 
 def _tops(study: Study, searches: Searches, centre: Array, arm: float, served: Array) -> Array:
-    """Where the parabolas along the axes have their tops, for the goals that are served: at most a few places."""
+    """Return the tops of the parabolas along the axes, for the goals that are served: at most a few places."""
     xi, parameters = study.runs.xi, len(study.inputs)
     near = np.abs(xi - centre).max(axis=1) <= 2 * arm
     away = (xi[near] - centre) / arm

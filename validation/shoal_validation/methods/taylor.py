@@ -40,7 +40,7 @@ class Pieces:
         return found
 
     def each(self, xi: Array, columns: IntArray) -> Array:
-        """One column at each place."""
+        """Return one column at each place."""
         found = np.empty(len(xi))
         cell, local = located(xi, self.cut)
         for k in np.unique(cell):
@@ -76,7 +76,7 @@ def taylor(study: Study) -> Plan:
 
 
 def _series(study: Study, order: int, cut: int) -> Expansion | Pieces:
-    """Raises ComputationError."""
+    """Fit the series of every cell. Raises ComputationError."""
     runs, parameters = study.runs, len(study.inputs)
     cell, local = located(runs.xi, cut)
     terms = total_degree(parameters, order)

@@ -20,7 +20,7 @@ from shoal_validation.suspects.cases import case
 
 @dataclass(frozen=True)
 class Trial:
-    """What came out. named: the suspects that explain the recording best, equals together
+    """Outcome of one trial. named: the suspects that explain the recording best, equals together
 
     alike: those of them of which a small fault has the same effect as the cause (cosine above 0.999)
     covered: of the sought parameters, how many intervals hold the truth; noticed: whether a misfit was seen at all
@@ -41,7 +41,7 @@ class Trial:
 
     @property
     def place(self) -> str:
-        """Where the cause is: named alone, with those of the same effect, with others that fit as well, or nowhere."""
+        """Place of the cause: named alone, with those of the same effect, with others that fit as well, or nowhere."""
         if self.cause not in self.named:
             return "missed" if self.noticed else "unseen"
         if len(self.named) == 1:

@@ -24,7 +24,7 @@ MOST = 5000
 
 @dataclass(frozen=True)
 class Repeated:
-    """One limit many times, each with a seed of its own.
+    """Repeated estimates of one limit, each with a seed of its own.
 
     held: share of the intervals that hold the exact probability; doubted: share that is told to be in doubt; ratios: of
     what was told to the exact probability, (repetitions,); runs: the most that one took
@@ -42,7 +42,7 @@ class Repeated:
 
 
 def margins(function: Function, count: int) -> Margins:
-    """Of so many parameters."""
+    """Return the margins of a function of `count` standard normal variables."""
     names = [f"x{k}" for k in range(count)]
 
     def model(values: Mapping[str, Array]) -> Answers:
@@ -56,7 +56,7 @@ def margins(function: Function, count: int) -> Margins:
 
 
 def plane(beta: float, count: int) -> tuple[Function, float]:
-    """At this distance from the origin."""
+    """Return a plane at distance beta from the origin, and its probability."""
     return lambda x: beta - x.sum(axis=1) / math.sqrt(count), float(stats.norm.sf(beta))
 
 

@@ -23,7 +23,7 @@ from shoal.response.runs import TimeIsUpError, TooManyRunsError
 from shoal.trajectory import Array
 
 OFTEN = 0.1
-"""Probability from which plain sampling tells it as well."""
+"""Probability from which plain sampling estimates it as well."""
 PILOT = 200
 """Runs of each level that look for the places where the limit is exceeded."""
 STARTS = 6
@@ -48,7 +48,7 @@ MOST_POINTS = 30
 SEVERAL = 3
 """Design points from which on a search that has not ended may have missed some."""
 SEEN = 25
-"""Runs beyond the limit, of those drawn all around, that tell the probability whether or not points were missed."""
+"""Runs beyond the limit, of those drawn all around, that estimate the probability whether or not points were missed."""
 FIRST = 0.35
 """Share of the runs of importance sampling that its proposals are fitted to."""
 LEAST = 0.3
@@ -92,7 +92,7 @@ def by_importance(margins: Margins, seed: int) -> Exceedance:
 
 
 def by_subset(margins: Margins, seed: int) -> Exceedance:
-    """All runs in levels."""
+    """Return the probability by subset simulation with all runs."""
     # About one level for every power of ten down to a millionth.
     found = subset(margins, max(margins.left // 7, 20), seed)
     return Exceedance(
@@ -101,7 +101,7 @@ def by_subset(margins: Margins, seed: int) -> Exceedance:
 
 
 def monte_carlo(margins: Margins, seed: int) -> Exceedance:
-    """All runs drawn from the distributions."""
+    """Return the probability by plain Monte Carlo with all runs."""
     count = margins.left
     places = np.random.default_rng(seed).standard_normal((count, len(margins.inputs)))
     drawn = Sample(places, margins(places), np.ones(count))
@@ -228,14 +228,14 @@ WAYS: dict[str, Callable[[Margins, int], Exceedance]] = {
 
 
 def get_way(name: str) -> Callable[[Margins, int], Exceedance]:
-    """The way of that name. Raises InputError."""
+    """Return the method of that name. Raises InputError."""
     if name not in WAYS:
         raise InputError(f"limit-method: no way {name!r}; there are {', '.join(WAYS)}")
     return WAYS[name]
 
 
 def probability(margins: Margins, way: str, seed: int) -> Exceedance:
-    """Raises InputError, also where there are too few runs."""
+    """Return the probability by a method of `WAYS`. Raises InputError, also where there are too few runs."""
     try:
         return get_way(way)(margins, seed)
     except TimeIsUpError:
@@ -300,7 +300,7 @@ def _disagree(
 ) -> list[Finding]:
     """Return a finding where an independent estimate is larger (or, for `both`, smaller) than chance allows.
 
-    least: coefficient of variation of the other at least; told: what it is
+    least: coefficient of variation of the other at least; source: what it is
     """
     if not other.probability:
         return []

@@ -18,7 +18,7 @@ CONFIDENCE = 1.959963984540054
 class ExceedanceEstimate:
     """The probability that a limit is exceeded at some instant up to each.
 
-    passed: (instants,); deviation: of its logarithm, (instants,), infinite where no run has passed; unseen: a
+    exceeded: (instants,); deviation: of its logarithm, (instants,), infinite where no run exceeds it; unseen: a
     probability that the runs may have missed altogether; failed: probability of the runs that failed; between: share
     of the probability that more instants would add, nan where it is not known; why: in words
     """
@@ -32,7 +32,7 @@ class ExceedanceEstimate:
 
     @property
     def probability(self) -> float:
-        """Over all instants."""
+        """Probability over all instants."""
         return float(self.exceeded[-1])
 
     @property
@@ -42,7 +42,7 @@ class ExceedanceEstimate:
 
     @property
     def described(self) -> str:
-        """The probability in words: where no run has passed the limit, not 0 but what it is below."""
+        """The probability in words: where no run exceeds the limit, not 0 but an upper bound."""
         if self.probability == 0:
             return f"below {float(self.interval[1][-1]):.2g}"
         return "not known" if math.isnan(self.probability) else f"{self.probability:.3g}"
@@ -63,7 +63,7 @@ def first_passages(margins: Array) -> IntArray:
 
 
 def weighted(margins: Array, weights: Array, why: str) -> ExceedanceEstimate:
-    """From independent runs with weights (those of plain ones are 1)."""
+    """Estimate a probability from independent runs with weights (1 for plain ones)."""
     count, instants = margins.shape
     first = first_passages(margins)
     beyond = first < instants
@@ -71,7 +71,7 @@ def weighted(margins: Array, weights: Array, why: str) -> ExceedanceEstimate:
     squares = np.cumsum(np.bincount(first[beyond], weights[beyond] ** 2, instants)) / count
     variance = np.maximum(squares - exceeded**2, 0.0) / max(count - 1, 1)
     deviation = np.divide(np.sqrt(variance), exceeded, out=np.full(instants, np.inf), where=exceeded > 0)
-    # Where all of n runs pass, more than 1 - 3.7 / n do with 97.5 % confidence.
+    # Where all of n runs exceed it, more than 1 - 3.7 / n do with 97.5 % confidence.
     deviation = np.maximum(deviation, -math.log(0.025) / (CONFIDENCE * count))
     lost = float(weights[np.isnan(margins).any(axis=1)].sum() / count)
     # No event in n runs: less than 3.7 / n with 97.5 % confidence.
@@ -80,7 +80,7 @@ def weighted(margins: Array, weights: Array, why: str) -> ExceedanceEstimate:
 
 
 def _between(margins: Array, weights: Array) -> float:
-    """From what every second instant leaves out: the depth that is missed falls with the square of the spacing."""
+    """Extrapolate from every second instant: the depth that is missed falls with the square of the spacing."""
     sparse = margins[:, ::-2]
     whole = weights[(margins < 0).any(axis=1)].sum()
     if not whole > 0 or margins.shape[1] < 3:

@@ -20,7 +20,7 @@ from shoal.response.limits.margins import least
 from shoal.trajectory import Array
 
 COARSE = 0.15
-"""Coefficient of variation above which the estimate is told to be coarse."""
+"""Coefficient of variation above which the estimate is reported as coarse."""
 
 
 @dataclass(frozen=True)
@@ -65,8 +65,8 @@ def contradictions(
 ) -> list[Finding]:
     """Return a finding where the number of runs beyond the limit is unlikely (binomial tests of both ends, one-sided).
 
-    margins: of runs drawn from the distributions, (runs, instants); share: of them that counts as independent;
-    outside: probability of that part of the distributions which they are drawn from: what passes may lie elsewhere, so
+    margins: of runs drawn from the distributions, (runs, instants); share: of them that counts as independent; outside:
+    probability of that part of the distributions which they are drawn from: the failure domain may lie elsewhere, so
     that few say nothing
     """
     lower, upper = ends(estimate)

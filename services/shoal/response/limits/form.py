@@ -61,7 +61,7 @@ class DesignPoint:
 
 
 def design_points(margins: Margins, starts: Array) -> list[DesignPoint]:
-    """From these starts, (starts, parameters); the nearest first, each once. Raises InputError."""
+    """Search design points from these starts, (starts, parameters); the nearest first, each once. Raises InputError."""
     u = starts.copy()
     rows = margins(u)
     g = least(rows)
@@ -110,7 +110,7 @@ def _converged(u: Array, g: Array, slope: Array) -> BoolArray:
 
 
 def _step(margins: Margins, u: Array, g: Array, slope: Array) -> tuple[Array, Array, Array]:
-    """Towards the nearest place of the tangent, as far as the merit |u|^2 / 2 + c |g| is least."""
+    """Step towards the nearest place of the tangent, as far as the merit |u|^2 / 2 + c |g| is least."""
     square = np.sum(slope**2, axis=1)
     wanted = ((np.sum(slope * u, axis=1) - g) / square)[:, None] * slope
     far = np.linalg.norm(wanted, axis=1)
@@ -139,7 +139,7 @@ def _point(u: Array, slope: Array, row: Array, converged: bool) -> DesignPoint:
 
 
 def distinct(found: list[DesignPoint]) -> list[DesignPoint]:
-    """Each once: the converged ones that matter, the nearest first; if there are none, the others."""
+    """Return each design point once: the converged ones that matter, the nearest first; else the others."""
     chosen: list[DesignPoint] = []
     wanted = [point for point in found if point.converged] or found
     for point in sorted(wanted, key=lambda point: abs(point.beta)):

@@ -9,8 +9,8 @@ distance of the nearest design point (Harbitz, An efficient sampling method for 
 Structural Safety 3, 1986), which bounds the weights there (Hesterberg, Weighted average importance sampling and
 defensive mixture distributions, Technometrics 37, 1995).
 
-A response surface tells most runs beyond the limit from the others. Its own probability is known from many places that
-take no runs, so that the runs need to estimate the difference only: a control variate, which leaves the estimate
+A response surface separates most runs beyond the limit from the others. Its own probability is known from many places
+that take no runs, so that the runs need to estimate the difference only: a control variate, which leaves the estimate
 unbiased however wrong the surface is (Peherstorfer, Cui, Marzouk and Willcox, Multifidelity importance sampling,
 Computer Methods in Applied Mechanics and Engineering 300, 2016).
 """
@@ -37,11 +37,11 @@ WIDER = 1.3
 FAR_OUT, TAIL = 0.2, 1.5
 """Share of the runs of a fitted distribution that are drawn this much wider still, for tails that are curved."""
 ENOUGH = 4
-"""Runs that tell of a distribution."""
+"""Runs to which a distribution is fitted, at least."""
 PLAIN = 0.2
 """Share of the runs around design points where there are fitted distributions as well."""
 PARTS, MOST_PARTS = (1, 2, 4), 40
-"""Fitted distributions for each design point; which number serves best, runs tell; and how many there are at most
+"""Fitted distributions for each design point; runs decide which number serves best; and how many there are at most
 together if there are several for each."""
 OTHERS = 0.3
 """Share of the mixtures fitted to other samples than the best: a response surface, or few runs, may have missed a
@@ -53,10 +53,10 @@ FLAT = 0.05
 FREE = 20
 """Places at which a response surface is evaluated, for each run."""
 SURE = 1.9
-"""Where the surface foretells all of n runs beyond a limit, with 95 % confidence the probability is off by less than
+"""Where the surface predicts all of n runs beyond a limit, with 95 % confidence the probability is off by less than
 3.7 / n: so many standard deviations over n."""
 OUTSIDE: dict[int, list[tuple[float, ...]]] = {1: [(0.1,), (0.9,)], 2: [(0.05, 0.05), (0.1, 0.8), (0.8, 0.1)]}
-"""Shares of the runs that are drawn all around, by the number of ways to do it; runs tell which serve best."""
+"""Shares of the runs that are drawn all around, by the number of ways to do it; runs decide which serve best."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ class Outside:
         return float(special.gammaincc(len(self.axes) / 2, self.radius**2 / 2))
 
     def draw(self, count: int, random: np.random.Generator) -> Array:
-        """(count, parameters)."""
+        """Draw places of the region, (count, parameters)."""
         places = random.standard_normal((count, self.axes.shape[1]))
         along = places @ self.axes.T
         squares = 2 * special.gammainccinv(len(self.axes) / 2, random.random(count) * self.probability)
@@ -88,7 +88,7 @@ class Outside:
 
 
 def outsides(points: list[DesignPoint], beyond: Array) -> list[Outside]:
-    """In all directions, and in those that the limit depends on at its design points, if these are fewer.
+    """Return regions outside a radius in all directions and, if these are fewer, in those on which the limit depends.
 
     Just within the design points and the runs beyond the limit, (runs, parameters).
     """
@@ -157,7 +157,7 @@ class Mixture:
 
 
 def around(points: list[DesignPoint], outside: list[Outside]) -> Mixture:
-    """One unit normal distribution around each design point, by their first-order probabilities."""
+    """Return a mixture of unit normal distributions around the design points, by their first-order probabilities."""
     means = np.array([point.place for point in points])
     shares = np.array([max(point.probability, 1e-300) for point in points])
     # None is left out: a first-order probability may be off by far.
@@ -237,7 +237,7 @@ def controlled(found: Sample, proposal: Mixture, chances: Callable[[Array], Arra
     if probability <= 0 or variance >= float(covariance[0, 0]):
         return estimate
     deviation = max(math.sqrt(variance) / probability, SURE / np.count_nonzero(beyond))
-    # Which part of it is passed up to an instant, the runs alone tell: the variance of a ratio.
+    # Which part of it is exceeded up to an instant, the runs alone show: the variance of a ratio.
     instants, part = found.rows.shape[1], estimate.exceeded / estimate.probability
     first = first_passages(found.rows)
     inside = first < instants
@@ -300,7 +300,7 @@ def _fitted(plain: Mixture, beyond: Sample, parts: int, prior: float) -> Mixture
     """Return a mixture with `parts` components for each design point, which together follow a curved limit.
 
     plain: around the design points, which is what no parts give; prior: for how many observations of a unit covariance
-    a part is taken, as few tell little of all directions
+    a part is taken, as few do not determine all directions
     """
     if not parts:
         return plain

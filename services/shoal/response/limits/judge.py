@@ -24,7 +24,7 @@ from shoal.trajectory import Array, Trajectory
 MOST = 5_000
 """Runs for the probability of a limit unless another number is asked for."""
 FINER = 200
-"""Instants at which the run nearest to a limit is looked at, from the first instant to the last,"""
+"""Instants at which the run nearest to a limit is evaluated, from the first instant to the last,"""
 CLOSER = 3
 """and so often at most, each time between the two where it may come nearest, such as where a quantity changes sign."""
 Reach = Callable[[Model, float], tuple[Array, Array, Array, int, int]]
@@ -73,7 +73,7 @@ def _show(limit: Limit, machine: ResponseModel, inputs: Inputs, xi: Array, verif
 
 
 def _run_shown(limit: Limit, machine: ResponseModel, inputs: Inputs, named: Array, verify: bool) -> VerifiedRun:
-    """Raises InputError, ComputationError."""
+    """Run the machine at the decisive values. Raises InputError, ComputationError."""
     if verify:
         return show(limit, machine.scene, machine.times, machine.engine, inputs, named)
     scene = limit.scene(machine.scene.with_values(inputs.at(named)))
@@ -94,7 +94,7 @@ def judge(
     verify: bool = True,
     progress: Callable[[int], None] | None = None,
 ) -> LimitResult:
-    """By probability where all parameters are random, by bounds of the margin where all are intervals.
+    """Assess a limit: probability of random parameters, bounds of the margin over intervals.
 
     Where there are both, see `response.assess.between`. reach: bounds a model; way: one of `WAYS`; most: runs for a
     probability. Raises InputError, ComputationError.
@@ -138,7 +138,7 @@ def _decided(attained: Array, outer: Array) -> bool | None:
 
 
 def _between(limit: Limit, machine: ResponseModel, shown: VerifiedRun) -> float | None:
-    """When [s] a run passes a limit first of all instants between those of a machine; None if at none."""
+    """Return the first instant [s] at which a run exceeds a limit between those of a machine; None if at none."""
     begin, end = float(machine.times[0]), float(machine.times[-1])
     scene = limit.scene(machine.scene.with_values(shown.values))
     engine = limit.engine(machine.engine, scene)

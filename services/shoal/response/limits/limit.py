@@ -29,7 +29,7 @@ _EXPRESSION = re.compile(r"^\s*(abs\()?\s*(?:([^\s()<>]+)\.)?(\w+)\s*(\))?\s*(<|
 
 @dataclass(frozen=True)
 class Limit:
-    """Passed where a quantity lies beyond a bound: above it or below it, its absolute value or itself.
+    """Limit that is exceeded where a quantity lies beyond a bound: above it or below it, its absolute value or itself.
 
     text: as the user states it; place: a marker, a joint, or empty for the whole machine, as the quantity has it;
     above: whether it is exceeded above the bound; stated: as what must not happen, or as what is required
@@ -151,7 +151,7 @@ def read_limits(limits: Iterable[str], requirements: Iterable[str], scene: Scene
 
 
 def _read(field: str, text: str, scene: Scene) -> Limit:
-    """Raises InputError."""
+    """Parse a condition. Raises InputError."""
     found = _EXPRESSION.match(text)
     if found is None or bool(found[1]) != bool(found[4]):
         raise InputError(f"{field}: {text!r} is not {FORM}")
@@ -170,14 +170,14 @@ def _read(field: str, text: str, scene: Scene) -> Limit:
 
 
 def _quantity(motion: Trajectory, marker: str, quantity: str) -> Array:
-    """(instants, lanes)."""
+    """Return a kinematic quantity of a marker, (instants, lanes). Raises InputError."""
     k = motion.markers.index(marker)
     if quantity in motion.axes:
         return np.asarray(motion.points[:, k, motion.axes.index(quantity)])
     if quantity == "angle":
         return np.asarray(motion.angles[:, k])
     if motion.velocities is None or motion.rates is None:
-        raise InputError(f"limit: engine {motion.engine} does not tell {quantity}; there are x, y, angle")
+        raise InputError(f"limit: engine {motion.engine} does not give {quantity}; there are x, y, angle")
     if quantity == "rate":
         return np.asarray(motion.rates[:, k])
     velocity = motion.velocities[:, k]
@@ -228,7 +228,7 @@ def _error(limit: Limit, deviation: Deviation, bending: bool) -> Array:
         return np.asarray(plain.margins(run, scene, {})[0])
 
     if deviation.source == "theory" and limit.is_dynamic and bending:
-        # Rigid rods tell no forces of flexible ones: what is left out is taken as the same share of the quantity.
+        # Rigid rods give no forces of flexible ones: what is left out is taken as the same share of the quantity.
         if not any(deviation.scenes[0].flexible_rods):
             return np.zeros(len(motion.times))
         return np.asarray(deviation.factor * np.maximum.accumulate(np.abs(quantity(motion, deviation.scenes[0]))))

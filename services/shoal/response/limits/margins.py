@@ -12,7 +12,7 @@ from shoal.response.runs import Model, TooManyRunsError
 from shoal.trajectory import Array
 
 FAR = 8.0
-"""Distance from the origin up to which places are looked at: beyond lies a probability of 1e-15."""
+"""Distance from the origin up to which places are evaluated: beyond lies a probability of 1e-15."""
 
 
 @dataclass
@@ -35,7 +35,7 @@ class Margins:
     _rows: list[Array] = field(default_factory=list)
 
     def __call__(self, places: Array) -> Array:
-        """Raises TooManyRunsError before it makes more than `most` runs, InputError."""
+        """Return the margins at these places. Raises InputError, and TooManyRunsError before more than `most` runs."""
         if self.evaluations + len(places) > self.most:
             raise TooManyRunsError
         answers = self.model(self.inputs.values(self.inputs.standard(places)))

@@ -69,7 +69,7 @@ def needs_states(quantity: str, scene: Scene) -> bool:
 
 
 def check(place: str, quantity: str, scene: Scene) -> None:
-    """Return whether a machine tells it of a marker, a joint or, where place is empty, itself. Raises InputError."""
+    """Check that a machine gives it of a marker, a joint or, where place is empty, itself. Raises InputError."""
     d = scene.dimensions
     if quantity in ENERGIES:
         if place:
@@ -102,7 +102,7 @@ def check(place: str, quantity: str, scene: Scene) -> None:
 
 
 def _check_rod(scene: Scene, marker: str, quantity: str) -> None:
-    """Return whether a marker lies on a rod that tells its section forces or its strain. Raises InputError."""
+    """Check that a marker lies on a rod that gives its section forces or its strain. Raises InputError."""
     name = scene.markers[marker].body
     rod = scene.bodies.get(name)
     if not isinstance(rod, Rod) or rod.element == "rigid":
@@ -110,18 +110,18 @@ def _check_rod(scene: Scene, marker: str, quantity: str) -> None:
         known = f"; flexible are {', '.join(bending)}" if bending else ""
         raise InputError(f"{quantity} is that of a flexible rod; {name}, with marker {marker}, is rigid{known}")
     if rod.element == "modal":
-        raise InputError(f"{quantity} is told of rods of elements; bodies.{name}.element is modal, use ancf-cable")
+        raise InputError(f"{quantity} is known of rods of elements; bodies.{name}.element is modal, use ancf-cable")
     if quantity not in STRAINS:
         return
     if scene.dimensions == 3 and rod.element != "director-rod":
-        raise InputError(f"{quantity} is in space told of director rods; bodies.{name}.element is {rod.element}")
+        raise InputError(f"{quantity} is in space known of director rods; bodies.{name}.element is {rod.element}")
     for field in _BENT:
         if getattr(rod, field):
-            raise InputError(f"{quantity} is told of straight rods; bodies.{name}.{field} is not zero")
+            raise InputError(f"{quantity} is known of straight rods; bodies.{name}.{field} is not zero")
 
 
 _BODY = "moved-body-"
-"""Of the names of markers that tell the motion of bodies."""
+"""Prefix of the names of markers that give the motion of bodies."""
 
 
 @dataclass(frozen=True)
@@ -149,7 +149,9 @@ def engine_for(engine: Engine, scene: Scene, quantity: str) -> Engine:
     if not needs_states(quantity, scene):
         return engine
     if not isinstance(engine, GaussEngine):
-        raise InputError(f"limit: {quantity} of this machine is told by the engine gauss alone; found {engine.name}")
+        raise InputError(
+            f"limit: {quantity} of this machine is computed by the engine gauss alone; found {engine.name}"
+        )
     return Telling(engine.threads)
 
 
@@ -173,7 +175,7 @@ def quantity_over_time(
     """
     found = np.full((len(motion.times), motion.lanes), np.nan)
     each_lane = _by_states if needs_states(quantity, scene) else _by_course
-    # A model of all lanes tells places and accelerations in each, and forces of parts in the first only.
+    # A model of all lanes gives places and accelerations in each, and forces of parts in the first only.
     alone = quantity not in STRAINS and not (each_lane is _by_course and quantity in ENERGIES)
     alone = alone or scene.alone(values) is not None
     for lane, one in each_lane(motion, scene, values, quantity, alone):
@@ -188,7 +190,7 @@ def _by_course(
     from shoal.mechanics.analysis.course import Course, machine, machines  # slow to import
 
     if motion.velocities is None or motion.rates is None:
-        raise InputError(f"{quantity} needs rates, of which engine {motion.engine} tells none; use gauss")
+        raise InputError(f"{quantity} needs rates, of which engine {motion.engine} gives none; use gauss")
     rows = [motion.markers.index(f"{_BODY}{name}") for name in scene.bodies]
     parts = motion.points[:, rows], motion.velocities[:, rows], motion.angles[:, rows], motion.rates[:, rows]
     course = Course(motion.times, *parts)
@@ -206,7 +208,7 @@ def _by_states(
     from shoal.mechanics.analysis.felt import lane_of, lanes_of  # slow to import
 
     if motion.states is None:
-        raise InputError(f"{quantity} needs all coordinates, which this motion does not tell")
+        raise InputError(f"{quantity} needs all coordinates, which this motion does not hold")
     finite = np.all(np.isfinite(motion.states.q) & np.isfinite(motion.states.v), axis=(0, 1))
     whole = np.flatnonzero(finite).tolist()
     if alone:
@@ -216,7 +218,7 @@ def _by_states(
 
 
 def _of_lane(one: Felt, quantity: str, place: str) -> Array:
-    """(instants,)."""
+    """Return the quantity of one lane, (instants,)."""
     from shoal.mechanics.analysis.energies import energies_along  # slow to import
     from shoal.mechanics.analysis.reactions_along import reactions_along
     from shoal.mechanics.analysis.sections_along import section_along

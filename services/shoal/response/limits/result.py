@@ -24,7 +24,7 @@ from shoal.trajectory import Array
 NEARLY_SURE = 0.99
 """A limit that is exceeded with a higher probability may have been stated the other way round."""
 MOST_BEYOND = 0.25
-"""Reliability index by which interval values that were not looked at may lie beyond, and no more."""
+"""Reliability index by which interval values that were not examined may lie beyond, at most."""
 
 
 @dataclass(frozen=True)
@@ -32,8 +32,8 @@ class VerifiedRun:
     """Verified run at the design point or at the worst interval values of a limit.
 
     parameters: name -> value; values: path -> value; time [s]: of the least margin; margin: there; status: of the run;
-    errors: of its margins, None where they were not estimated; between [s]: when it passes the limit although it does
-    not at the instants looked at, None where it does not, or nobody has looked
+    errors: of its margins, None where they were not estimated; between [s]: when it exceeds the limit although it does
+    not at the instants looked at, None where it does not, or was not examined
     """
 
     parameters: dict[str, float]
@@ -57,7 +57,7 @@ class ProbabilityBounds:
 
     lower, upper: judged where it is least and largest; at_lower, at_upper: name -> value of the intervals there;
     beyond: by how much the reliability index may be larger than at the one, and smaller than at the other; places:
-    interval values that were looked at
+    interval values that were examined
     """
 
     lower: LimitResult
@@ -74,7 +74,7 @@ class ProbabilityBounds:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """From the lower end of the one to the upper end of the other, see `LimitResult.interval`."""
+        """Interval from the lower end of the one to the upper end of the other, see `LimitResult.interval`."""
         return self.lower.interval[0], self.upper.interval[1]
 
     @property
@@ -86,7 +86,7 @@ class ProbabilityBounds:
 
     @property
     def findings(self) -> list[Finding]:
-        """Reasons for doubt: those of both ends, each once, and interval values that were not looked at."""
+        """Reasons for doubt: those of both ends, each once, and interval values that were not examined."""
         both = {one.text: one for one in (*self.lower.reasons, *self.upper.reasons)}
         return [*both.values(), *undecided(max(self.beyond))]
 
@@ -115,7 +115,7 @@ class ProbabilityBounds:
 
 
 def undecided(beyond: float) -> list[Finding]:
-    """Return a finding where interval values that were not looked at may change the reliability index too much."""
+    """Return a finding where interval values that were not examined may change the reliability index too much."""
     if beyond <= MOST_BEYOND:
         return []
     text = f"the interval values that decide are not known: others may change beta by {beyond:.2g}"
@@ -127,9 +127,9 @@ class LimitResult:
     """Result for one limit.
 
     way: that was asked for; times [s]; passing: of random parameters, else None; kept: of intervals, whether no values
-    pass it, None where that is not decided; margin, outer: the least that a run attains, and that any may have with the
-    known error of the model, nan where not known; shown: the most probable way to pass it, or the run with the least
-    margin; evaluations, failed: runs made for it alone; reason: why the first of these failed; between: of random
+    exceed it, None where that is not decided; margin, outer: the least that a run attains, and that any may have with
+    the known error of the model, nan where not known; shown: the most probable way to exceed it, or the run with the
+    least margin; evaluations, failed: runs made for it alone; reason: why the first of these failed; between: of random
     parameters beside intervals; hidden: whether runs would decide it, were the known error of their model not as large
     as the margin; shifted: probability counted in runs if the known error of the model made all margins larger, as they
     are, and if it made them smaller, None where it was not counted
@@ -287,7 +287,7 @@ class LimitResult:
 
     @property
     def moved(self) -> float:
-        """By how much the known error of the model may change the reliability index; 0 where none is known.
+        """Change of the reliability index that the known error of the model may cause; 0 where none is known.
 
         To first order at a design point; where there is none, counted in runs.
         """
@@ -310,7 +310,7 @@ class LimitResult:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Between which two the probability lies, with 95 % confidence and the known error of the model."""
+        """95 % confidence interval of the probability, widened by the known error of the model."""
         (estimate,) = self.estimates
         lower, upper = (float(end[-1]) for end in estimate.interval)
         return self._with_errors(lower)[0], self._with_errors(upper)[1]
@@ -320,7 +320,7 @@ class LimitResult:
         if not self.moved:
             return chance, chance
         fewer, same, more = self.shifted or (0.0, 0.0, 0.0)
-        if self._point is None and not 0.0 < same < 1.0:  # all runs or none pass: nothing to compare with
+        if self._point is None and not 0.0 < same < 1.0:  # all runs or none exceed it: nothing to compare with
             return chance * fewer if same else chance, min(chance + more - same, 1.0)
         if not 0.0 < chance < 1.0:
             return chance, chance

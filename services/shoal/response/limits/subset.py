@@ -24,7 +24,7 @@ SHARE = 0.1
 LEVELS = 12
 """After these, the probability is below 1e-12."""
 BETWEEN = 1.3
-"""The deviation is larger than what Au and Beck's formula tells, which leaves out that the chains of a level begin
+"""The deviation is larger than what Au and Beck's formula gives, which leaves out that the chains of a level begin
 where those before it ended: by so much at most, over the closed forms of the tests."""
 SAME = 1e-8
 """Margins that differ by less than this part of the least one do not depend on what varies."""
@@ -100,7 +100,7 @@ def subset(margins: Margins, count: int, seed: int) -> Levels:
 
 
 def _together(strata: list[Sample]) -> Sample:
-    """One weighted sample of strata whose weights are probabilities."""
+    """Return one weighted sample of strata whose weights are probabilities."""
     places, rows, weights = (
         np.concatenate([getattr(one, name) for one in strata]) for name in ("places", "rows", "weights")
     )
@@ -116,7 +116,7 @@ def _ends(g: Array) -> tuple[float, float]:
 def _chains(
     margins: Margins, u: Array, rows: Array, threshold: float, length: int, spread: float, random: np.random.Generator
 ) -> tuple[Array, Array, Array, float]:
-    """One chain from each place, side by side; all states, those of one step after those of the one before."""
+    """Run one chain from each place, side by side; returns all states, step by step."""
     places, kept = [u], [rows]
     for step in range(1, length):
         move = min(spread, 1.0)

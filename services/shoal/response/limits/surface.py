@@ -40,7 +40,7 @@ RIDGE = 1e-9
 NOTHING = 1e-9
 """Of the margins near the limit: the least error that a surface is taken to have."""
 UNLIKELY = 0.05
-"""Chances of passing below this one are none: far from the limit they would be many small ones with large weights."""
+"""Probabilities of exceedance below this count as none: far from the limit many small ones would have large weights."""
 BLOCK = 10_000
 
 
@@ -63,7 +63,7 @@ class SurfaceTerms:
         return 1 + self.degree * count + (count * (count - 1) // 2 if self.products else 0)
 
     def __call__(self, places: Array) -> Array:
-        """At places of the standard normal space, (places, terms)."""
+        """Return the terms at places of the standard normal space, (places, terms)."""
         x = np.clip(places, -FAR, FAR)
         if self.scales is not None:
             x = (self.inputs.named(self.inputs.standard(x)) - self.scales[0]) / self.scales[1]
@@ -91,12 +91,12 @@ class Surface:
     error: float
 
     def __call__(self, places: Array) -> Array:
-        """(places, instants)."""
+        """Return the margins at these places, (places, instants)."""
         blocks = range(0, max(len(places), 1), BLOCK)
         return np.concatenate([self.terms(places[k : k + BLOCK]) @ self.coefficients for k in blocks])
 
     def chances(self, places: Array) -> Array:
-        """Probabilities that runs there pass the limit, as far as the surface can say, (places,)."""
+        """Return the probabilities that runs there exceed the limit, according to the surface, (places,)."""
         found = special.ndtr(-(self(places) / self.spread).min(axis=1))
         return np.where(found < UNLIKELY, 0.0, found)
 
@@ -155,7 +155,7 @@ def _candidates(inputs: Inputs, places: Array) -> Iterator[SurfaceTerms]:
 
 
 def _deciding(rows: Array) -> IntArray:
-    """In order."""
+    """Return the instants that decide runs near the limit, in order."""
     count = rows.shape[1]
     if count <= INSTANTS:
         return np.arange(count)

@@ -1,7 +1,7 @@
 """Bounds over a box that runs attain: fit a polynomial, run its extremal points, enter them into the fit, go on.
 
-Runs are made where the answer is decided; the difference between what the polynomial foretold there and what the run
-says is its error. The degree grows until the foretold bounds and the attained ones meet.
+Runs are made where the answer is decided; the difference between what the polynomial predicted there and what the run
+says is its error. The degree grows until the predicted bounds and the attained ones meet.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ MORE = 8
 
 @dataclass(frozen=True)
 class StudyState:
-    """Where a study stands.
+    """State of a study.
 
     surrogate: fitted to all runs; error: of the last one at runs that it had not seen, (columns,); gap: by which outer
     bounds lie at least beyond attained ones, as a share of the width, (columns,); found: extremal points that were run;
@@ -64,7 +64,7 @@ class StudyState:
 
 
 def bounds(study: Study) -> Found:
-    """Raises InputError."""
+    """Bound the answers. Raises InputError."""
     runs, parameters = study.runs, len(study.inputs)
     unit = np.eye(parameters)
     runs(np.vstack([np.zeros((1, parameters)), unit, -unit]))
@@ -85,7 +85,7 @@ def bounds(study: Study) -> Found:
 
 
 def _grown(plan: Screened, here: StudyState, degree: int) -> tuple[StudyState, int]:
-    """Until outer and attained bounds meet, or no more runs help; and the degree."""
+    """Grow the degree until outer and attained bounds meet, or no more runs help; also returns the degree."""
     again = 0
     with suppress(TooManyRunsError):
         while not _done(plan, here):
@@ -121,7 +121,7 @@ def _carried(plan: Screened, degree: int) -> bool:
 
 
 def _fit_columns(plan: Screened, degree: int) -> Expansion:
-    """Every column by this degree, or by a lower one where that foretells much better what is left out of its fit."""
+    """Fit every column by this degree, or by a lower one that predicts much better what is left out of its fit."""
     inputs, runs = plan.study.inputs, plan.study.runs
     best = fit(inputs, runs.xi, runs.values, plan.terms(degree))
     for lower in range(degree - 1, 0, -1):
@@ -137,7 +137,7 @@ def _fit_columns(plan: Screened, degree: int) -> Expansion:
 
 
 def _falling(plan: Screened, found: Expansion, degree: int, before: Decay | None) -> Decay | None:
-    """How fast coefficients fall, as the worst told column of every group tells; None where all are told well.
+    """Return the decay of coefficients in the worst column of every group; None where all are predicted well.
 
     before: of fewer runs
     """
@@ -150,7 +150,7 @@ def _falling(plan: Screened, found: Expansion, degree: int, before: Decay | None
 
 
 def _with_more_terms(plan: Screened, found: Expansion, decay: Decay | None) -> Expansion:
-    """Each column by more terms than there are runs, unless that one foretells clearly better what is left out."""
+    """Return each column with more terms than runs, unless the other predicts clearly better what is left out."""
     if decay is None:
         return found
     runs = plan.study.runs
@@ -183,13 +183,13 @@ def _round(plan: Screened, degree: int, before: Decay | None = None) -> StudySta
     new = _promising(plan, surrogate, found)
     made = len(runs.xi)
     if runs(new) == 0:
-        # Nothing new is foretold: a few places tell whether that can be believed.
+        # Nothing new is predicted: a few places test that.
         runs(study.inputs.sobol(parameters + 1, study.seed + 1, runs.evaluations))
     error = np.abs(surrogate(runs.xi[made:]) - runs.values[made:]).max(axis=0, initial=0.0)
     # New runs lie where the polynomial is known best; those left out of the fit lie everywhere.
     error = study.beside(np.maximum(error, surrogate.left_out))
     if _carried(plan, degree):
-        # What the new runs tell makes the polynomial better; its error is what it was without them.
+        # The new runs make the polynomial better; its error is what it was without them.
         surrogate = _with_more_terms(plan, _fit_columns(plan, degree), decay)
     # What shows at once that a study is not done saves the rest, unless the horizon is looked for.
     enclosed = None
@@ -204,9 +204,9 @@ def _round(plan: Screened, degree: int, before: Decay | None = None) -> StudySta
 
 
 def _promising(plan: Screened, surrogate: Expansion, found: Extremes) -> Array:
-    """Extremal points that are foretold to widen the attained bounds most, beside what those chosen before do.
+    """Extremal points that are predicted to widen the attained bounds most, beside what those chosen before do.
 
-    Groups take turns, so that one that is hard to tell does not take all runs from those that few more would settle.
+    Groups take turns, so that one that is hard to fit does not take all runs from those that few more would settle.
     """
     study, runs = plan.study, plan.study.runs
     least = 0.25 * (study.gap or FINE_GAP)

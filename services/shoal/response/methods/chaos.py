@@ -33,17 +33,17 @@ COARSE = 3e-2
 """Above this share, more runs are made: so many times."""
 MORE = 5
 DECAYS = 6
-"""Columns that tell how their coefficients fall."""
+"""Columns to which the decay of coefficients is fitted."""
 
 
 def chaos(study: Study) -> Found:
-    """Of `degree`, or of the degree that foretells best what is left out of its fit. Raises InputError."""
+    """Expand in `degree`, or in the degree that predicts best what is left out of its fit. Raises InputError."""
     study.random_only("chaos")
     return grown(study, study.count or RUNS)
 
 
 def grown(study: Study, fair: int) -> Found:
-    """More and more runs, until an expansion tells those that it was not fitted to, or so many are made.
+    """Make more and more runs, until an expansion predicts those that it was not fitted to, or so many are made.
 
     One that is still coarse then may take more.
     """
@@ -66,7 +66,7 @@ def grown(study: Study, fair: int) -> Found:
     kind = "regularised " if len(found.terms) > len(runs.xi) / SHARE else ""
     why = f"{kind}polynomial chaos of degree {degree} fitted to {len(runs.xi)} runs{chosen.why}"
     errors = moment_errors(study, chosen, lambda part: chosen.again(part, _fitted, _chosen))
-    return Found(why, found, chosen.left_out, errors=errors, linked=chosen if chosen.links else None)
+    return Found(why, found, chosen.left_out, errors=errors, transformed=chosen if chosen.links else None)
 
 
 def _expanded(study: Study, *, more: bool) -> Transformed:
@@ -84,13 +84,13 @@ def _chosen(study: Study) -> Expansion:
 
 
 def _fitted(study: Study) -> Expansion:
-    """To the runs of a part of a study."""
+    """Fit an expansion to the runs of a part of a study."""
     found = _chosen(study)
     return found if study.degree else _with_more_terms(study, found, shares(study, found.left_out) <= CONVERGED)
 
 
 def _reaching(study: Study, found: Expansion) -> Expansion:
-    """With the error further out than runs tell."""
+    """Return an expansion whose error includes that further out than runs reach."""
     found = outwards(study.runs.xi, study.runs.values, found)
     return _with_hidden(found)
 
@@ -101,9 +101,9 @@ def _with_hidden(found: Expansion) -> Expansion:
 
 
 def _with_more_terms(study: Study, found: Expansion, good: BoolArray) -> Expansion:
-    """In every column that one, or a regularised one that foretells better; good: columns that need none, (columns,).
+    """Return in every column that expansion, or a regularised one that predicts better; good: need none, (columns,).
 
-    The column that is told worst tells how coefficients fall; what that is good for elsewhere is taken there as well.
+    The decay of coefficients is fitted to the worst column; where it serves other columns it is taken there as well.
     """
     runs, inputs = study.runs, study.inputs
     tried = good.copy()

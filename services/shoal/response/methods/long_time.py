@@ -42,7 +42,7 @@ class UnsuitableError(Exception):
 
 @dataclass(frozen=True)
 class Watch:
-    """How runs are watched.
+    """Runs that are followed closely over time.
 
     times: evenly from 0 to beyond the last instant [s], (samples,); first: the run in the middle, (samples, signals);
     signal: the one with the most even cycles; uneven: how much a cycle differs from the next, as a share; turns: its
@@ -67,7 +67,9 @@ class Watch:
             self.courses.append(course)
 
     def spread(self) -> float:
-        """How far the phase at the last instant may lie from the middle one's [rad], by the runs of a star."""
+        """Return by how much the phase at the last instant may differ from the middle one's [rad], by the runs of a
+        star.
+        """
         end, parameters = self.study.when[-1], len(self.study.inputs)
         self.follow(np.vstack([np.eye(parameters), -np.eye(parameters)]))
         phases = []
@@ -124,7 +126,7 @@ def _most_even(times: Array, course: Array) -> tuple[int, float, int]:
     turning = np.flatnonzero(seen > CYCLES)
     if not len(turning):
         raise UnsuitableError("the motion has too few cycles")
-    # As many samples as are kept of the one that turns most often tell the cycles of all.
+    # As many samples as are kept of the one that turns most often resolve the cycles of all.
     apart = max(1, len(times) // (PER_TURN[1] * int(seen.max())))
     times = times[::apart]
     every = spline(times, course[::apart, turning])
@@ -140,12 +142,12 @@ def _most_even(times: Array, course: Array) -> tuple[int, float, int]:
 
 
 def spline(times: Array, values: Array) -> BSpline:
-    """Through all samples, (samples,) or (samples, signals)."""
+    """Interpolate all samples, (samples,) or (samples, signals)."""
     return make_interp_spline(times, values, SPLINE_DEGREE)
 
 
 def turning_points(times: Array, signal: BSpline) -> Array:
-    """Where a signal is largest or smallest [s], without the one that a run from rest begins with."""
+    """Return the turning points of a signal [s], without the one that a run from rest begins with."""
     speed, change = signal.derivative(), signal.derivative(2)
     v = speed(times)
     size = np.abs(v).max()
@@ -162,7 +164,7 @@ def turning_points(times: Array, signal: BSpline) -> Array:
 
 
 def refuse_without_course(study: Study, method: str) -> None:
-    """Raises InputError where a model is known at its instants only."""
+    """Check that a model is known between its instants. Raises InputError."""
     if study.over_time is None:
         raise InputError(f"method: {method} follows runs over time; this model is known at its instants only")
 
@@ -183,21 +185,21 @@ class TooSlowError(Exception):
 
 
 class LongTime(Protocol):
-    """What is told of a run instead of its places at single instants."""
+    """Representation of a run by cycles instead of values at single instants."""
 
     name: str
 
     def of(self, course: Array) -> Any:
-        """Of one run; course: (samples, signals). Raises UnsuitableError."""
+        """Represent one run; course: (samples, signals). Raises UnsuitableError."""
         ...
 
     def surrogate(self, study: Study, xi: Array, runs: list[Any], terms: Terms) -> Surrogate:
-        """Fitted to these runs, which `of` has told. Raises UnsuitableError, TooSlowError."""
+        """Fit a surrogate to these runs as represented by `of`. Raises UnsuitableError, TooSlowError."""
         ...
 
 
 def grown(study: Study, kind: Callable[[Watch], LongTime], seen: Watch | None = None) -> Found:
-    """Raises InputError, UnsuitableError."""
+    """Grow a surrogate of cycles. Raises InputError, UnsuitableError."""
     for stretch in STRETCHES:
         try:
             return _grown(study, kind, seen or watch(study, stretch))
@@ -243,12 +245,12 @@ def _grown(study: Study, make: Callable[[Watch], LongTime], seen: Watch) -> Foun
         pass
     if found is None or found.share > max(wanted, OFF):
         off = "too few runs" if found is None else f"its error is {found.share:.1g} of the width"
-        raise UnsuitableError(f"{kind.name} does not foretell new runs: {off}")
+        raise UnsuitableError(f"{kind.name} does not predict new runs: {off}")
     return found
 
 
 def _controlled(study: Study, found: Found) -> Found:
-    """With what runs all over the box say of its error. Raises TooManyRunsError."""
+    """Enlarge the error by what control runs show. Raises TooManyRunsError."""
     assert found.surrogate is not None
     assert found.error is not None
     missed = control_misses(study, found.surrogate)
@@ -259,7 +261,7 @@ def _controlled(study: Study, found: Found) -> Found:
 
 
 def _share(study: Study, error: Array) -> float:
-    """What an error leaves between attained and outer bounds, as a share of the width: the largest."""
+    """Return the largest gap that an error leaves between attained and outer bounds, as a share of the width."""
     width = study.widths(study.runs.values)
     return float(np.divide(SAFETY * error, width, out=np.zeros_like(width), where=width > 0).max())
 
@@ -270,14 +272,14 @@ def _carried(parameters: int, degree: int, runs: int) -> bool:
 
 
 def missing(study: Study, seen: Watch, terms: Terms) -> Array:
-    """Where to run for these terms, beside what was run."""
+    """Return further places for these terms."""
     parameters, xi = len(study.inputs), np.array(seen.xi)
     least = len(terms) if parameters == 1 else math.ceil(SHARE * len(terms))
     return box_design(study.inputs, xi, terms, least - len(xi), study.seed)
 
 
 def at_every_instant(places: int, instants: int, at: Callable[[IntArray], Array]) -> Array:
-    """What `at` tells of every place at every instant, (places, columns)."""
+    """Return the values of `at` at every place and instant, (places, columns)."""
     return np.stack([at(np.full(places, k)) for k in range(instants)], axis=1).reshape(places, -1)
 
 

@@ -61,7 +61,7 @@ ENOUGH = 1
 
 
 def nested(study: Study) -> Found:
-    """Of `degree`, or of the degree that foretells best what is left out of its fit. Raises InputError."""
+    """Expand in `degree`, or in the degree that predicts best what is left out of its fit. Raises InputError."""
     inputs, runs = study.inputs, study.runs
     if not inputs.mixed:
         raise InputError("vary: method nested needs an interval and a distribution; auto takes either alone")
@@ -78,7 +78,7 @@ def nested(study: Study) -> Found:
             sides = _extremes(study, found)
             where = _deciding(sides)
             before = len(runs.xi)
-            # What it foretells of these runs, which it was not fitted to, tells how far off it is.
+            # Its predictions of these runs, which it was not fitted to, show how far off it is.
             runs.all(_at(inputs, where, study.seed + 7 + decided))
             decided += len(where)
             error = np.maximum(found.left_out, _unseen(study, found, where, before))
@@ -106,12 +106,12 @@ def _towards_ends(inputs: Inputs, xi: Array) -> Array:
 
 
 def best(study: Study) -> Expansion:
-    """In every column of the degree that tells most."""
+    """Fit every column by its best degree."""
     return choose_degree(study, SHARE, lambda found: _reaching(study, found))
 
 
 def _reaching(study: Study, found: Expansion) -> Expansion:
-    """With the error further out than runs tell, at the middle and the ends of the intervals."""
+    """Return an expansion whose error includes that beyond the runs, at the middle and the ends of the intervals."""
     if not study.inputs.mixed:
         return found
     found, count = outwards(study.runs.xi, study.runs.values, found), int((~study.inputs.random).sum())
@@ -123,12 +123,12 @@ def _reaching(study: Study, found: Expansion) -> Expansion:
 
 
 def _hidden(of: Conditional, given: Array) -> Array:
-    """Of every column at interval variables of its own, (columns, intervals)."""
+    """Return the hidden part of the deviation of every column at its own intervals, (columns, intervals)."""
     return hidden(of.each(given, np.arange(len(given))), of.random, of.terms)
 
 
 def _extremes(study: Study, found: Expansion) -> list[Extremes]:
-    """Of mean and deviation."""
+    """Return the extremes of mean and standard deviation over the intervals."""
     of, columns = Conditional(found), study.runs.values.shape[1]
     return [extremes(one, len(of.intervals), columns, study.seed) for one in (Mean(of), Above(of))]
 

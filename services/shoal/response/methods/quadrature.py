@@ -41,7 +41,7 @@ def gauss(recurrence: Recurrence, count: int) -> tuple[Array, Array]:
 
 
 def quadrature(study: Study) -> Found | None:
-    """An expansion, or None where the rules do not agree or do not foretell drawn runs; then all are set aside."""
+    """An expansion, or None where the rules do not agree or do not predict drawn runs; then all are set aside."""
     if study.degree or study.count or not study.inputs.random.all() or len(study.inputs) not in FIRST:
         return None
     try:
@@ -55,7 +55,7 @@ def quadrature(study: Study) -> Found | None:
 
 
 def _agreeing(study: Study) -> Found | None:
-    """Raises InputError."""
+    """Double the points until two rules agree. Raises InputError."""
     inputs, runs = study.inputs, study.runs
     before: Expansion | None = None
     count = FIRST[len(inputs)]
@@ -85,7 +85,7 @@ def _agreeing(study: Study) -> Found | None:
 
 
 def _broken_off(found: Expansion | None) -> Found:
-    """By the last rule that was finished. Raises TimeIsUpError if there is none."""
+    """Return the result of the last rule that was finished. Raises TimeIsUpError if there is none."""
     if found is None:
         raise TimeIsUpError
     std = np.sqrt(found.variance)
@@ -93,7 +93,7 @@ def _broken_off(found: Expansion | None) -> Found:
 
 
 def _controlled(study: Study, found: Expansion, apart: Array, count: int) -> Found | None:
-    """By runs that the rule has not seen. Raises InputError."""
+    """Check the expansion by runs that the rule has not seen. Raises InputError."""
     inputs, runs, made = study.inputs, study.runs, study.runs.evaluations
     runs.all(inputs.sobol(CONTROLS, study.seed))
     if runs.failed:

@@ -1,6 +1,6 @@
 """Time warp: the instants of turning points, and the course between them, as polynomials of the parameters.
 
-At equal instants runs with different periods drift apart, and no polynomial of moderate degree tells one from another.
+At equal instants runs with different periods drift apart, and no polynomial of moderate degree separates them.
 At equal phase they remain alike however long it lasts (Le Maitre, Mathelin, Knio and Hussaini, Asynchronous time
 integration for polynomial chaos expansion of uncertain periodic dynamics, Discrete and Continuous Dynamical Systems 28,
 2010; Mai and Sudret, Surrogate models for oscillatory systems using sparse polynomial chaos expansions and stochastic
@@ -30,15 +30,15 @@ from shoal.response.study import Found, Study
 from shoal.trajectory import Array
 
 NODES = 20
-"""Places between two turning points: a polynomial of one degree less tells the course there."""
+"""Places between two turning points: a polynomial of one degree less interpolates the course there."""
 MOST = 40_000_000
 """Numbers that a surrogate may consist of."""
 
 
 @dataclass(frozen=True)
 class Cycles:
-    """One run. turns: 0 and the instants of turning points [s], (turns + 1,); course: between them as coefficients of
-    Chebyshev polynomials, (turns, NODES, signals)
+    """Cycles of one run. turns: 0 and the instants of turning points [s], (turns + 1,); course: between them as
+    coefficients of Chebyshev polynomials, (turns, NODES, signals)
     """
 
     turns: Array
@@ -59,12 +59,12 @@ class Warped:
     instants: Array
 
     def __call__(self, xi: Array) -> Array:
-        """(places, columns)."""
+        """Return all columns, (places, columns)."""
         basis = self.inputs.basis(xi, self.terms)
         return at_every_instant(len(xi), len(self.instants), lambda at: self._at(basis, at))
 
     def each(self, xi: Array, columns: IntArray) -> Array:
-        """One column at each place, (places,)."""
+        """Return one column at each place, (places,)."""
         signals = self.course.shape[2]
         answers = self._at(self.inputs.basis(xi, self.terms), columns // signals)
         return np.asarray(answers[np.arange(len(xi)), columns % signals])
@@ -74,7 +74,7 @@ class Warped:
         return np.ascontiguousarray(self.turns.T)
 
     def _at(self, basis: Array, at: IntArray) -> Array:
-        """At one instant each, (places, signals)."""
+        """Return all signals at one instant of each place, (places, signals)."""
         when, last = self.instants[at], self.turns.shape[1] - 1
 
         def begin(turn: IntArray) -> Array:
@@ -99,7 +99,7 @@ class Warped:
 
 @dataclass(frozen=True)
 class TimeWarp:
-    """See `LongTime`."""
+    """Representation of runs by turning points and the course between them, see `LongTime`."""
 
     watch: Watch
     name = "time warp"
@@ -115,7 +115,7 @@ class TimeWarp:
         return Cycles(turns, np.einsum("ij,kjs->kis", to_coefficients, whole(at)))
 
     def surrogate(self, study: Study, xi: Array, runs: list[Cycles], terms: Terms) -> Warped:
-        """Raises UnsuitableError, TooSlowError."""
+        """Fit turning points and courses. Raises UnsuitableError, TooSlowError."""
         turns = min(len(run.turns) for run in runs) - 1
         if turns * len(terms) * runs[0].course[0].size > MOST:
             raise UnsuitableError(f"{turns} turning points are too many")
@@ -133,5 +133,5 @@ class TimeWarp:
 
 
 def time_warp(study: Study) -> Found:
-    """Raises InputError, also where the motion has no cycles that all runs share."""
+    """Bound by time warp. Raises InputError, also where the motion has no cycles that all runs share."""
     return stated(study, TimeWarp, "time-warp")

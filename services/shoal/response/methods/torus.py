@@ -22,7 +22,7 @@ from shoal.response.study import Found, Study
 from shoal.trajectory import Array
 
 ORDERS = 3, 5, 7, 9, 11
-"""Sums of |k|, tried until the middle run is told or gets no better."""
+"""Sums of |k|, tried until the middle run is fitted or gets no better."""
 TOLD = 1e-9
 """Misfit of a run, as a share of its deviation, that is good enough."""
 MISFIT = 1e-3
@@ -39,7 +39,7 @@ SETTLED = 1e-10
 
 @dataclass(frozen=True)
 class LineSpectrum:
-    """One run. frequencies [rad/s], (base,); coefficients: of cosines, then sines, (2 K, signals)"""
+    """Line spectrum of one run. frequencies [rad/s], (base,); coefficients: of cosines, then sines, (2 K, signals)"""
 
     frequencies: Array
     coefficients: Array
@@ -61,13 +61,13 @@ class Wound:
     instants: Array
 
     def __call__(self, xi: Array) -> Array:
-        """(places, columns)."""
+        """Return all columns, (places, columns)."""
         basis = self.inputs.basis(xi, self.terms)
         parts = basis @ self.frequencies, np.tensordot(basis, self.waves, 1)
         return at_every_instant(len(xi), len(self.instants), lambda at: self._at(*parts, at))
 
     def each(self, xi: Array, columns: IntArray) -> Array:
-        """One column at each place, (places,)."""
+        """Return one column at each place, (places,)."""
         signals = self.waves.shape[2]
         basis = self.inputs.basis(xi, self.terms)
         found = np.empty(len(xi))
@@ -87,7 +87,9 @@ class Wound:
 
 @dataclass
 class Torus:
-    """See `LongTime`. It remembers the runs before, whose frequencies tell which lines of the next to take."""
+    """Representation of runs by lines of their spectra, see `LongTime`. It remembers the runs before, whose frequencies
+    decide which lines of the next to take.
+    """
 
     watch: Watch
     name = "torus"
@@ -120,7 +122,7 @@ class Torus:
         self.known = best.frequencies
 
     def of(self, course: Array) -> LineSpectrum:
-        """The lines of one run. Raises UnsuitableError where they do not tell it."""
+        """The lines of one run. Raises UnsuitableError where they do not fit it."""
         assert self.known is not None
         lines = _lines(self.watch.times, course / self._range, 2 * LINES)
         near = np.array([lines[np.argmin(np.abs(lines - one))] for one in self.known])
@@ -132,7 +134,7 @@ class Torus:
         return found
 
     def surrogate(self, study: Study, xi: Array, runs: list[LineSpectrum], terms: Terms) -> Wound:
-        """See `LongTime`."""
+        """Fit frequencies and Fourier coefficients."""
         parts = np.stack([np.concatenate([run.frequencies, run.coefficients.ravel()]) for run in runs])
         found = fit(study.inputs, xi, parts, terms).coefficients
         base = len(runs[0].frequencies)
@@ -171,7 +173,7 @@ class Torus:
 
 
 def whole(base: int, order: int) -> IntArray:
-    """All k with |k| summing up to at most the order, one of each k and -k; the first is 0."""
+    """Return all k with |k| summing up to at most the order, one of each k and -k; the first is 0."""
     axes = np.meshgrid(*[np.arange(-order, order + 1)] * base, indexing="ij")
     every = np.stack([axis.ravel() for axis in axes], axis=1)
     every = every[np.abs(every).sum(axis=1) <= order]
@@ -195,5 +197,5 @@ def _lines(times: Array, course: Array, most: int = LINES) -> Array:
 
 
 def torus(study: Study) -> Found:
-    """Raises InputError, also where the motion has more frequencies, or they resonate."""
+    """Bound by a torus. Raises InputError, also where the motion has more frequencies, or they resonate."""
     return stated(study, Torus, "torus")
