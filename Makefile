@@ -8,6 +8,9 @@ MAKEFLAGS += --no-print-directory
 UV_VERSION := 0.13.8
 BIN := .venv/bin
 STAMP := .venv/.installed
+DEVELOPED := .venv/.developed
+# What commands, flows, services and `make up` need; the rest of the lock is for development.
+RUN := engines mujoco pipeline services deploy scale fmu notebook sample
 SUITABLE := import sys, venv, ensurepip; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 12))
 
 # Without compiled modules every process of the tests would spend seconds on reading sources. What every command imports is
@@ -17,12 +20,13 @@ OFTEN := click llvmlite numba numpy pydantic rich scipy yaml
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export DO_NOT_TRACK := true
 
-.PHONY: help setup demo kernels test lint types imports containers bench charts docs up up-postgres secrets lock clean
+.PHONY: help setup develop demo kernels test lint types imports containers bench charts docs up up-postgres secrets lock
+.PHONY: clean
 
 help:  ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 13
 
-setup: $(STAMP)  ## make .venv and install the locked packages
+setup: $(STAMP)  ## make .venv and install the locked packages that Shoal needs to run
 
 # `make setup PYTHON=/path/to/python` chooses another interpreter.
 $(STAMP): pyproject.toml requirements.lock
@@ -41,9 +45,17 @@ $(STAMP): pyproject.toml requirements.lock
 	  $(BIN)/python -m pip install --quiet 'uv==$(UV_VERSION)'; \
 	fi
 	@echo "installing the locked packages"
-	@VIRTUAL_ENV="$(CURDIR)/.venv" $(BIN)/uv pip sync --quiet requirements.lock
-	@VIRTUAL_ENV="$(CURDIR)/.venv" $(BIN)/uv pip install --quiet --no-deps --no-build-isolation --editable .
+	@VIRTUAL_ENV="$(CURDIR)/.venv" $(BIN)/uv pip install --quiet --constraints requirements.lock \
+	  --requirements pyproject.toml $(RUN:%=--extra %)
+	@VIRTUAL_ENV="$(CURDIR)/.venv" $(BIN)/uv pip install --quiet --no-deps --build-constraints requirements.lock --editable .
 	@$(BIN)/python -m compileall -q -j 0 services flows validation $(addprefix .venv/lib/python3*/site-packages/,$(OFTEN))
+	@touch $@
+
+develop: $(DEVELOPED)  ## setup, and the locked tools of development: tests, types, documents, browser
+
+$(DEVELOPED): $(STAMP)
+	@echo "installing the locked tools of development"
+	@VIRTUAL_ENV="$(CURDIR)/.venv" $(BIN)/uv pip install --quiet --requirements requirements.lock
 	@touch $@
 
 demo: setup  ## identify and compare both cases of the paper; one table, one report
@@ -55,31 +67,31 @@ kernels: setup
 
 # Of two cores three processes leave hardly any idle: some tests wait for a server, a service or another's compilation.
 # A file stays in one process, which makes its fixtures once; in order, as the longest files come early.
-test: kernels  ## the tests
+test: kernels develop  ## the tests
 	@OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 3 --dist loadfile --no-loadscope-reorder $(ARGS)
 
-lint: setup  ## style, format and spelling
+lint: develop  ## style, format and spelling
 	@$(BIN)/ruff check
 	@$(BIN)/ruff format --check
 	@$(BIN)/codespell docs README.md CHANGELOG.md
 
-types: setup  ## static types
+types: develop  ## static types
 	@$(BIN)/mypy
 
-imports: setup  ## imports go one way
+imports: develop  ## imports go one way
 	@$(BIN)/lint-imports
 
-containers: setup  ## the compose file against its schema, the Dockerfile against good practice
+containers: develop  ## the compose file against its schema, the Dockerfile against good practice
 	@$(BIN)/check-jsonschema --builtin-schema vendor.compose-spec docker-compose.yml
 	@$(BIN)/hadolint Dockerfile
 
-bench: setup  ## speed and accuracy against the other engines
+bench: develop  ## speed and accuracy against the other engines
 	@$(BIN)/python -m shoal_validation.benchmarks
 
-charts: setup  ## every chart and table of docs/ again (hours; ARGS=--list, ARGS="--only NAME", ARGS="--since DATE")
+charts: develop  ## every chart and table of docs/ again (hours; ARGS=--list, ARGS="--only NAME", ARGS="--since DATE")
 	@$(BIN)/python -m shoal_validation.renew $(ARGS)
 
-docs: setup  ## the documentation as pages, in site/
+docs: develop  ## the documentation as pages, in site/
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 	@echo "documentation: site/index.html"
 
@@ -98,7 +110,7 @@ LOCKED = $(shell $(BIN)/python -c 'import tomllib; \
   print(*(f"--extra {name}" for name in extras if name != "openturns"))')
 
 lock: setup  ## resolve pyproject.toml anew into requirements.lock
-	@$(BIN)/uv pip compile --quiet --upgrade $(LOCKED) --no-emit-index-url --no-header --no-annotate -p 3.11 \
+	@$(BIN)/uv pip compile --quiet --upgrade --generate-hashes $(LOCKED) --no-emit-index-url --no-header --no-annotate -p 3.11 \
 	  pyproject.toml -o requirements.lock
 
 clean:  ## remove the environment, the caches and the state, but for the library
