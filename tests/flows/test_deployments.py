@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -123,3 +124,25 @@ def test_nights_do_not_pile_up(flows: Any) -> None:
     assert flow.timeout_seconds == 3600
     queues = {one["work_pool"]["work_queue_name"] for name, one in DEPLOYMENTS.items() if name != "night"}
     assert night["work_pool"]["work_queue_name"] not in queues
+
+
+def test_saved_parameters_of_the_release_before_are_renamed(flows: Any) -> None:
+    """Of deployments and of their schedules; those of today and of foreign flows stay."""
+    from shoal_flows.deployment.deploy import rename_parameters
+
+    old, new = {"scene": "arm", "values": {"a": 1}}, {"scene": "arm", "set": {"a": 1}}
+    schedules = [SimpleNamespace(id=7, parameters=old), SimpleNamespace(id=8, parameters=None)]
+    saved = [
+        SimpleNamespace(id=1, flow_id="forward", parameters=old, schedules=schedules),
+        SimpleNamespace(id=2, flow_id="forward", parameters=new, schedules=[]),
+        SimpleNamespace(id=3, flow_id="foreign", parameters=old, schedules=[]),
+    ]
+    found: dict[Any, Any] = {}
+    client: Any = SimpleNamespace(
+        read_deployments=lambda: saved,
+        read_flow=lambda name: SimpleNamespace(name=name),
+        update_deployment=lambda one, update: found.update({one: update.parameters}),
+        update_deployment_schedule=lambda one, schedule, parameters: found.update({(one, schedule): parameters}),
+    )
+    rename_parameters(client)
+    assert found == {1: new, (1, 7): new}

@@ -81,18 +81,21 @@ class Request(Asked):
         return self.model_dump(exclude=beside, exclude_unset=True)
 
 
-TIGHTER = {"seed": 2**32 - 1, "bootstrap": 10_000, "sample": 100_000}
+TIGHTER = {"seed": 2**32 - 1, "bootstrap": 10_000, "sample": 100_000, "runs": 20_000, "limit_runs": 20_000}
 """The largest numbers that this service takes, by field."""
+RUNS = 2_000
+"""Most runs of an uncertain response where the request does not say: a service admits scenes by the runs that they may
+take, and with the library's 20,000 it would refuse all but the smallest."""
 R = TypeVar("R", bound=Request)
 
 
-def of(name: str) -> Callable[[type[R]], type[R]]:
-    """Give a body the fields of a request, but for those that it states itself."""
+def of(name: str, **defaults: Any) -> Callable[[type[R]], type[R]]:
+    """Give a body the fields of a request, but for those that it states itself. defaults: those of the service."""
 
     def made(body: type[R]) -> type[R]:
         kind = request_of(name)
         stated = {
-            field: (_typed(one), ... if one.required else one.default)
+            field: (_typed(one), ... if one.required else defaults.get(field, one.default))
             for field, one in offered(kind, "http").items()
             if field not in body.model_fields
         }
@@ -181,7 +184,7 @@ class Sweep(OfScene):
         return self.vary
 
 
-@of("uncertain")
+@of("uncertain", runs=RUNS)
 class Uncertain(OfScene):
     """Bounds and statistics of the markers."""
 
@@ -190,18 +193,17 @@ class Uncertain(OfScene):
     vary: Annotated[dict[Path, Uncertainty], Field(min_length=1, max_length=100)]
     correlate: Annotated[list[tuple[Path, Path, float]], Field(max_length=1000)] = []
     method: BuiltIn = "auto"
-    runs: Annotated[int, Limit("a whole number", ge=3, le=20_000, whole=True)] = 2_000
     limit: Annotated[list[Annotated[str, Field(max_length=200)]], Field(max_length=10)] = []
     require: Annotated[list[Annotated[str, Field(max_length=200)]], Field(max_length=10)] = []
     limit_method: BuiltIn = "auto"
-    limit_runs: Annotated[int, Limit("a whole number", ge=100, le=20_000, whole=True)] = 5_000
     cost: dict[Path, Positive] | None = None
 
     @property
     def work(self) -> int:
         """Return the number of runs that may be made, about."""
         allocated = 4 * bool(getattr(self, "allocate", False))
-        return self.runs + (len(self.limit) + len(self.require) + allocated) * self.limit_runs
+        runs, limit_runs = (int(getattr(self, name)) for name in ("runs", "limit_runs"))
+        return runs + (len(self.limit) + len(self.require) + allocated) * limit_runs
 
 
 class AtRest(OfScene):
