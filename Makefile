@@ -20,8 +20,8 @@ OFTEN := click llvmlite numba numpy pydantic rich scipy yaml
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export DO_NOT_TRACK := true
 
-.PHONY: help setup develop demo kernels test lint types imports containers bench charts docs up up-postgres secrets lock
-.PHONY: clean
+.PHONY: help setup develop demo kernels test golden lint types imports containers bench charts docs up up-postgres secrets
+.PHONY: lock clean
 
 help:  ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 13
@@ -69,6 +69,9 @@ kernels: setup
 # A file stays in one process, which makes its fixtures once; in order, as the longest files come early.
 test: kernels develop  ## the tests
 	@OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 3 --dist loadfile --no-loadscope-reorder $(ARGS)
+
+golden: kernels develop  ## the words of each command, in tests/golden/
+	$(BIN)/python tests/test_golden.py
 
 lint: develop  ## style, format and spelling
 	@$(BIN)/ruff check
