@@ -20,7 +20,7 @@ from shoal.errors import ComputationError, InputError
 from shoal.findings import Finding, message
 from shoal.json_values import plain
 from shoal.response import findings as kinds
-from shoal.response.inputs import Inputs, UncertainParameter
+from shoal.response.inputs import ENDS, Inputs, UncertainParameter
 from shoal.response.marginals import scaled
 from shoal.response.runs import CachedModel, Model
 from shoal.scene import Scene
@@ -279,7 +279,7 @@ def accepted(scene: Scene, inputs: Inputs) -> Array:
 
 def _accepts(scene: Scene, one: UncertainParameter, factor: float) -> bool:
     marginal = scaled(one.marginal, factor)
-    ends = np.array([-1.0, 1.0]) if not marginal.random else marginal.quantile(np.array([1e-12, 1 - 1e-12]))
+    ends = np.array([-1.0, 1.0]) if not marginal.random else marginal.quantile(np.array(ENDS))
     try:
         for value in marginal.value(ends):
             scene.with_values({path: float(value) * share for path, share in one.factors.items()})

@@ -24,6 +24,8 @@ from shoal.trajectory import Array
 CHOICE = 8
 """Candidate places for every term."""
 FEWEST = 256
+APART = 1e-3
+"""Distance below which two places are one: about that of extremal points at the ends for degree 40, 1 / 40^2."""
 UNKNOWN = 1e-8
 """Prior information on every term, as a share of that of one run."""
 
@@ -66,7 +68,7 @@ def box_design(inputs: Inputs, xi: Array, terms: Terms, count: int, seed: int) -
     apart = np.full(len(places), np.inf)
     for known in xi:
         apart = np.minimum(apart, np.abs(places - known).max(axis=1))
-    return telling(inputs, xi, terms, count, places[apart > 1e-3])
+    return telling(inputs, xi, terms, count, places[apart > APART])
 
 
 MOST_ACTIVE = 10

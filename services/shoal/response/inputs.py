@@ -19,6 +19,8 @@ from shoal.trajectory import Array
 
 BoolArray = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 IntArray = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
+ENDS = 1e-12, 1 - 1e-12
+"""Probabilities up to which quantiles are taken: seven standard deviations of a normal variable."""
 Correlations = Mapping[tuple[str, str], float]
 """Of the normal variables behind two parameters (a Gaussian copula), by their names."""
 
@@ -260,5 +262,5 @@ class Inputs:
 
 
 def inside(x: Array) -> Array:
-    """Probabilities off 0 and 1, where quantiles are infinite."""
-    return np.clip(x, 1e-12, 1 - 1e-12)
+    """Return probabilities off 0 and 1, where quantiles are infinite."""
+    return np.clip(x, *ENDS)

@@ -150,7 +150,10 @@ class Frozen:
     def quantile(self, x: Array) -> Array:
         """The standardised value."""
         mean, deviation = self._scale
-        return np.asarray((self.distribution.ppf(x) - mean) / deviation)
+        return np.asarray((self._ppf(x) - mean) / deviation)
+
+    def _ppf(self, x: Array) -> Array:
+        return np.asarray(self.distribution.ppf(x))
 
     def value(self, s: Array) -> Array:
         """The value."""
@@ -159,38 +162,20 @@ class Frozen:
 
 
 @dataclass(frozen=True)
-class Empirical:
-    """Observed values, each as likely as another."""
-
-    data: Array
-    text: str = ""
-    random = True
-
-    @cached_property
-    def _scale(self) -> tuple[float, float]:
-        return float(np.mean(self.data)), float(np.std(self.data))
-
-    @property
-    def tolerance(self) -> float:
-        """The standard deviation."""
-        return self._scale[1]
+class Empirical(Frozen):
+    """Observed values, each as likely as another. distribution: the observations, (n,)."""
 
     @cached_property
     def basis(self) -> Recurrence:
-        """Orthonormal over the observations."""
+        """Polynomials orthonormal over the observations."""
         mean, deviation = self._scale
-        return of_measure((self.data - mean) / deviation, np.full(len(self.data), 1 / len(self.data)))
+        return of_measure(
+            (self.distribution - mean) / deviation, np.full(len(self.distribution), 1 / len(self.distribution))
+        )
 
-    def quantile(self, x: Array) -> Array:
-        """The standardised observation."""
-        mean, deviation = self._scale
-        ranks = np.minimum((np.asarray(x) * len(self.data)).astype(int), len(self.data) - 1)
-        return np.asarray((np.sort(self.data)[ranks] - mean) / deviation)
-
-    def value(self, s: Array) -> Array:
-        """The observation."""
-        mean, deviation = self._scale
-        return np.asarray(mean + deviation * s)
+    def _ppf(self, x: Array) -> Array:
+        count = len(self.distribution)
+        return np.asarray(np.sort(self.distribution)[np.minimum((np.asarray(x) * count).astype(int), count - 1)])
 
 
 @dataclass(frozen=True)

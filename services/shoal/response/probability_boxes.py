@@ -18,16 +18,13 @@ from itertools import product
 import numpy as np
 
 from shoal.response.expansion import Expansion
-from shoal.response.extremes import MOST_CORNERS, Each, Extremes, along, corners, extremes
+from shoal.response.extremes import HELD, MOST_CORNERS, Each, Extremes, along, corners, extremes
 from shoal.response.inputs import BoolArray, Inputs, IntArray
 from shoal.response.polynomials import Terms
 from shoal.response.runs import TimeIsUpError
 from shoal.response.statistics import DRAWN, QUANTILES
-from shoal.response.study import FINE_GAP, SAFETY, Found, Study
+from shoal.response.study import COARSE, FINE_GAP, SAFETY, Found, Study
 from shoal.trajectory import Array
-
-BLOCK = 4_000_000
-"""Numbers that are held at once."""
 
 
 @dataclass(frozen=True)
@@ -153,7 +150,7 @@ class Quantile:
     def each(self, xi: Array, columns: IntArray) -> Array:
         """Return one column at each place, (places,)."""
         found = self.of.each(xi, columns)
-        block = max(1, BLOCK // len(self.drawn))
+        block = max(1, HELD // len(self.drawn))
         parts = [
             np.quantile(self.drawn @ found[k : k + block].T, self.share, axis=0) for k in range(0, len(found), block)
         ]
@@ -172,9 +169,8 @@ BEYOND_HOPE = 0.1
 """Instants whose gap is above this share of the scatter lie beyond the horizon."""
 NOTHING = 0.01
 """Of the largest deviation: at interval values with less, the shares of that are not evaluated."""
-COARSE, LITTLE = 0.05, 0.1
-"""Share of a deviation above which its error calls for runs over the random parameters alone; at instants where it is
-below `LITTLE` of its largest, of that."""
+LITTLE = 0.1
+"""Share of the largest deviation to which its error is related at instants where it is smaller."""
 INTERVAL_VALUES, RUNS_EACH = 8, 128
 """Interval values that are sampled beyond it, and runs at each."""
 
@@ -329,7 +325,7 @@ def _quantiles(of: Conditional, sides: list[Extremes], error: Array, seed: int) 
     at = np.zeros((len(QUANTILES), 2, count, len(intervals)))
     signs = np.array([1.0, -1.0])[:, None]
     every = np.arange(count)
-    block = max(1, BLOCK // SEARCHED)
+    block = max(1, HELD // SEARCHED)
     for place in _looked_at(len(intervals), seed):
         parts = np.concatenate(of.parts(place[None]))
         found = [np.quantile(few @ parts[:, k : k + block], QUANTILES, axis=0) for k in range(0, count, block)]

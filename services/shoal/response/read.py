@@ -16,7 +16,7 @@ from scipy import stats
 
 from shoal.errors import InputError
 from shoal.regular import require_regular
-from shoal.response.inputs import Inputs, UncertainParameter
+from shoal.response.inputs import ENDS, Inputs, UncertainParameter
 from shoal.response.marginals import Empirical, Frozen, Interval, Marginal, Normal, Uniform
 from shoal.response.posterior import from_posterior, is_source
 from shoal.scene import Function, Scene
@@ -123,7 +123,7 @@ def _parameter(name: str, known: Any, scene: Scene) -> UncertainParameter:
     if len(paths) > 1 and nominal[paths[0]]:
         # Tied fields keep the ratios that the scene states.
         factors = {path: value / nominal[paths[0]] for path, value in nominal.items()}
-    low, high = marginal.value(marginal.quantile(np.array([1e-12, 1 - 1e-12])))
+    low, high = marginal.value(marginal.quantile(np.array(ENDS)))
     if isinstance(marginal, Interval):
         low, high = marginal.low, marginal.high
     for end in (low, high):

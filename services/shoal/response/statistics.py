@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
+from scipy import special
 from scipy.stats import qmc
 
 from shoal.response.expansion import Expansion
@@ -22,11 +23,11 @@ from shoal.response.inputs import BoolArray, Inputs, inside
 from shoal.response.study import Study
 from shoal.trajectory import Array
 
+CONFIDENCE = float(special.ndtri(0.975))
+"""Standard deviations within which a normal variable lies with 95 % probability."""
 QUANTILES = 0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99
 DRAWN = 2**14
 """Places at which an expansion is evaluated for quantiles."""
-SURE = 2.0
-"""Standard errors within which 95 % lie."""
 NOTHING = 1e-9
 """A deviation below this share of the largest of its group has no Sobol indices."""
 
@@ -65,12 +66,12 @@ def of_expansion(found: Expansion, inputs: Inputs, error: Array | None, runs: in
     for k in range(0, len(variance), block):
         quantiles[:, k : k + block] = np.quantile(places @ found.coefficients[:, k : k + block], QUANTILES, axis=0)
     unknown = np.full(len(variance), np.nan)
-    known = unknown if error is None else SURE * error / np.sqrt(runs)
+    known = unknown if error is None else CONFIDENCE * error / np.sqrt(runs)
     deviation = unknown
     if error is not None and found.squares is not None:
         # What is not explained is missing in the deviation as a whole, and what is explained scatters.
         missing = np.divide(error**2, 2 * np.sqrt(variance), out=np.zeros_like(error), where=varies)
-        deviation = SURE * np.hypot(np.maximum(found.squares, error) / np.sqrt(runs), missing)
+        deviation = CONFIDENCE * np.hypot(np.maximum(found.squares, error) / np.sqrt(runs), missing)
     return Statistics(found.mean, np.sqrt(variance), quantiles, first, total, known, deviation)
 
 
@@ -89,8 +90,8 @@ def of_runs(values: Array, indices: Array | None, parameters: int) -> Statistics
         np.quantile(values, QUANTILES, axis=0),
         first,
         total,
-        SURE * deviation / np.sqrt(independent),
-        SURE * off,
+        CONFIDENCE * deviation / np.sqrt(independent),
+        CONFIDENCE * off,
     )
 
 
@@ -138,7 +139,8 @@ def jansen(values: Array, parameters: int) -> Array:
 
 
 HALVES = 2.0
-"""Factor on the difference of a half from all: the error of half the runs is about twice that of the difference."""
+"""Factor on the difference of a half from all: 1 / (sqrt(2) - 1) = 2.4 if errors fall with the root of the runs; those
+of expansions fall faster."""
 
 
 class Moments(Protocol):
@@ -170,7 +172,7 @@ def moment_errors(study: Study, found: Moments, fitted: Callable[[Study], Moment
     made, std, left_out = len(study.runs.xi), np.sqrt(found.variance), found.left_out
     squares = left_out if found.squares is None else np.maximum(found.squares, left_out)
     missing = np.divide(left_out**2, 2 * std, out=np.zeros_like(std), where=std > 0)
-    scatter = SURE * np.array([left_out / np.sqrt(made), np.hypot(squares / np.sqrt(made), missing)])
+    scatter = CONFIDENCE * np.array([left_out / np.sqrt(made), np.hypot(squares / np.sqrt(made), missing)])
     apart, first = np.zeros_like(scatter), np.arange(made) < made // 2
     for half in (first, ~first):
         part = fitted(replace(study, runs=study.runs.part(half)))

@@ -17,14 +17,24 @@ from shoal.response.runs import CachedModel, Model
 from shoal.trajectory import Array
 
 FINE_GAP = 1e-6
-"""The gap that is aimed at where none is asked for: a share of the width."""
+"""The gap that is aimed at where none is asked for, as a share of the width: the last digit of printed bounds."""
 ROUNDING = 1e-11
 """A spread below this share of the answers is none."""
 LEAST, FAIR = 18, 1.39
 """Runs that a study may take without further reason: this number, or so many for every term of a polynomial of degree
 four."""
 SAFETY = 3.0
-"""An error that was seen is taken so many times."""
+"""Factor on an error that was observed at a few runs (convention: three standard deviations)."""
+CLEARLY = 0.5
+"""Share of an error below which another one is clearly smaller (convention: a factor of two)."""
+CONVERGED = 1e-4
+"""Error, as a share of the standard deviation, at which a statistic has converged: the fourth digit."""
+COARSE = 0.05
+"""Error, as a share of the standard deviation, above which an expansion gives way to the runs themselves."""
+RUNS = 300
+"""Runs of a polynomial chaos unless it is coarse by then."""
+PER_TERM = 1.25
+"""Runs for every term of a polynomial at designed places, at least; with one parameter as many as terms will do."""
 
 
 @dataclass(frozen=True)

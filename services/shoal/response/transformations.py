@@ -22,11 +22,8 @@ from shoal.response.polynomials import Recurrence, of_measure, size, total_degre
 from shoal.response.regularised import Decay, likeliest, regularised
 from shoal.response.runs import CachedModel
 from shoal.response.statistics import designs, jansen
-from shoal.response.study import Study
+from shoal.response.study import CLEARLY, CONVERGED, Study
 from shoal.trajectory import Array
-
-CLEARLY = 0.5
-"""Of the error of the expansion: below it a function is taken instead."""
 
 Fitted = Callable[[Study], Expansion]
 """The expansion of a study."""
@@ -146,10 +143,8 @@ def combined(inputs: Inputs, way: Array) -> Combined:
     return Combined(grid[there] / np.sqrt(weights @ grid[there] ** 2), weights)
 
 
-TILTED = 2**13
-"""Places at which what has no closed form is sampled for a moment."""
-INDEX_PLACES = 2**12
-"""And for shares, for every parameter."""
+SAMPLED = 2**13
+"""Quasi-random places for moments without a closed form and, for every parameter, for Sobol's indices."""
 REACHED = 5.0
 """Deviations of a normal variable; what is further out no run shows."""
 BEYOND = 1e-3
@@ -205,7 +200,7 @@ class Exponential:
         variance = np.maximum(whole - 1, 1e-300)
         found = np.array([(own - 1) / variance, 1 - (whole / own - 1) / variance])
         if self._cross.any():
-            places = designs(inputs, INDEX_PLACES, self.seed)
+            places = designs(inputs, SAMPLED, self.seed)
             parts = [self._split(part) for part in np.split(places, len(inputs) + 2)]
             alone, together = (np.concatenate(one) for one in zip(*parts, strict=True))
             found += jansen(together, len(inputs)) - jansen(alone, len(inputs))
@@ -230,7 +225,7 @@ class Exponential:
         It is sampled where the functions of one parameter have most of that mean.
         """
         of, found = self.logarithm, np.empty(len(self.signs))
-        x = inside(qmc.Sobol(len(of.inputs), rng=self.seed).random(TILTED))
+        x = inside(qmc.Sobol(len(of.inputs), rng=self.seed).random(SAMPLED))
         plain = of.inputs.quantiles(x)
         for column in range(len(found)):
             xi = plain.copy()
@@ -298,12 +293,8 @@ def exponentials(
     return [(columns, _exponential(columns_of(study, columns), fitted))] if len(columns) else []
 
 
-WELL_FITTED = 1e-4
-"""Error, as a share of the deviation, above which coefficients along a direction are held as well."""
 FAILURES = 6
 """Columns in which no ridge is found, after which none is looked for in others."""
-INDEX_PLACES = 2**13
-"""Places at which shares are sampled, for every parameter."""
 ALONG_DEGREES = 3, 6, 10, 15
 """Along a direction while it is turned."""
 TURNS = 12
@@ -345,7 +336,7 @@ class Ridge:
         """Return indices in closed form for normal variables, by Mehler's formula, else sampled."""
         inputs = self.inputs
         if not inputs.unbounded.all():
-            places = designs(inputs, INDEX_PLACES, len(self.along.terms))
+            places = designs(inputs, SAMPLED, len(self.along.terms))
             return jansen(self(places), len(inputs))
         degrees, parts = self.along.terms[1:, 0], self.along.coefficients[1:, 0] ** 2 / self.along.variance
         own = self.way[:, None] ** 2
@@ -379,7 +370,7 @@ def _ridge(study: Study, fitted: Fitted, way: Array, decay: Decay | None = None)
     one = Inputs((UncertainParameter("along", marginal, {}),))
     places = (_standardised(inputs, study.runs.xi) @ way)[:, None]
     along = fitted(with_answers(study, one, places, values))
-    if decay is None and along.left_out[0] > WELL_FITTED * values.std():
+    if decay is None and along.left_out[0] > CONVERGED * values.std():
         decay = likeliest(one, places, values[:, 0])
     if decay is not None:
         held = regularised(one, places, values, decay)

@@ -14,7 +14,7 @@ from shoal.findings import Finding
 from shoal.response import findings as kinds
 from shoal.response.limits.estimate import ExceedanceEstimate
 from shoal.response.limits.exceedance import Exceedance, coarse, contradictions
-from shoal.response.limits.form import APART, SHARES, DesignPoint, design_points, distinct
+from shoal.response.limits.form import APART, SHARES, STARTS, DesignPoint, design_points, distinct
 from shoal.response.limits.importance import Sample, adapted, controlled, sample
 from shoal.response.limits.margins import Margins, least
 from shoal.response.limits.subset import Levels, subset
@@ -26,8 +26,6 @@ OFTEN = 0.1
 """Probability from which plain sampling estimates it as well."""
 PILOT = 200
 """Runs of each level that look for the places where the limit is exceeded."""
-STARTS = 6
-"""Searches for design points."""
 DIFFERENT = 0.8
 """Cosine below which two runs beyond a limit lie in different directions."""
 STARTED = 3.0

@@ -8,10 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from shoal.response.inputs import IntArray
+from shoal.response.statistics import CONFIDENCE
 from shoal.trajectory import Array
 
-CONFIDENCE = 1.959963984540054
-"""Standard deviations that hold 95 % of a normal variable."""
+ALIKE = -math.log(0.025) / CONFIDENCE
+"""Standard deviations over n where n of n runs agree: with 97.5 % confidence fewer than
+-log(0.025) / n = 3.7 / n do not (the rule of three)."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +74,7 @@ def weighted(margins: Array, weights: Array, why: str) -> ExceedanceEstimate:
     variance = np.maximum(squares - exceeded**2, 0.0) / max(count - 1, 1)
     deviation = np.divide(np.sqrt(variance), exceeded, out=np.full(instants, np.inf), where=exceeded > 0)
     # Where all of n runs exceed it, more than 1 - 3.7 / n do with 97.5 % confidence.
-    deviation = np.maximum(deviation, -math.log(0.025) / (CONFIDENCE * count))
+    deviation = np.maximum(deviation, ALIKE / count)
     lost = float(weights[np.isnan(margins).any(axis=1)].sum() / count)
     # No event in n runs: less than 3.7 / n with 97.5 % confidence.
     unseen = 1 - 0.025 ** (1 / count)

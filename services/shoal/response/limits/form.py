@@ -151,7 +151,7 @@ def distinct(found: list[DesignPoint]) -> list[DesignPoint]:
 
 
 STARTS = 6
-"""Searches, beside the one that begins along the slope at the origin."""
+"""Searches from random directions, beside the one from the origin or along the slope there."""
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ from scipy import special
 from scipy.cluster import vq
 
 from shoal.response.inputs import BoolArray, IntArray
-from shoal.response.limits.estimate import ExceedanceEstimate, first_passages, weighted
+from shoal.response.limits.estimate import ALIKE, ExceedanceEstimate, first_passages, weighted
 from shoal.response.limits.form import DesignPoint
 from shoal.response.limits.margins import Margins, least
 from shoal.trajectory import Array
@@ -52,9 +52,6 @@ FLAT = 0.05
 """Of the largest singular value of the normals at design points: below, a limit does not depend on a direction."""
 FREE = 20
 """Places at which a response surface is evaluated, for each run."""
-SURE = 1.9
-"""Where the surface predicts all of n runs beyond a limit, with 95 % confidence the probability is off by less than
-3.7 / n: so many standard deviations over n."""
 OUTSIDE: dict[int, list[tuple[float, ...]]] = {1: [(0.1,), (0.9,)], 2: [(0.05, 0.05), (0.1, 0.8), (0.8, 0.1)]}
 """Shares of the runs that are drawn all around, by the number of ways to do it; runs decide which serve best."""
 
@@ -236,7 +233,7 @@ def controlled(found: Sample, proposal: Mixture, chances: Callable[[Array], Arra
     variance = float((beyond - share * predicted).var(ddof=1)) / count + share**2 * known
     if probability <= 0 or variance >= float(covariance[0, 0]):
         return estimate
-    deviation = max(math.sqrt(variance) / probability, SURE / np.count_nonzero(beyond))
+    deviation = max(math.sqrt(variance) / probability, ALIKE / np.count_nonzero(beyond))
     # Which part of it is exceeded up to an instant, the runs alone show: the variance of a ratio.
     instants, part = found.rows.shape[1], estimate.exceeded / estimate.probability
     first = first_passages(found.rows)

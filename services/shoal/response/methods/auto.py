@@ -14,10 +14,8 @@ from shoal.response.methods.nested import nested
 from shoal.response.methods.quadrature import quadrature
 from shoal.response.methods.time_warp import TimeWarp
 from shoal.response.methods.torus import Torus
-from shoal.response.study import Found, Study
+from shoal.response.study import COARSE, RUNS, Found, Study
 
-TOO_COARSE = 0.05
-"""An expansion that is off by more than this share of the standard deviation gives way to the runs themselves."""
 NO_SHARES = 0.15
 """Beyond this one so do its Sobol indices, which are off by its square: more runs are made for them."""
 SAMPLED = 8192
@@ -41,10 +39,10 @@ def auto(study: Study) -> Found:
         return nested(study)
     if (smooth := quadrature(study)) is not None:
         return smooth
-    found = chaos.grown(study, study.count or chaos.RUNS)
+    found = chaos.grown(study, study.count or RUNS)
     assert found.error is not None
     off = chaos.shares(study, found.error)
-    coarse = off > TOO_COARSE
+    coarse = off > COARSE
     if not coarse.any():
         return found
     about = f"{found.why} is off by up to {off.max():.2g} of the standard deviation"

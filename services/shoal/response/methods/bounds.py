@@ -12,18 +12,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shoal.response.design import Screened, box_design, screened
+from shoal.response.design import APART, Screened, box_design, screened
 from shoal.response.enclosure import contradicts, control_misses, enclose, enclosure, with_controls
 from shoal.response.expansion import Expansion, fit
 from shoal.response.extremes import Extremes, extremes
 from shoal.response.polynomials import HIGHEST
 from shoal.response.regularised import Decay, likeliest, regularised, trimmed
 from shoal.response.runs import TooManyRunsError
-from shoal.response.study import FINE_GAP, DatedEnclosure, Found, Study
+from shoal.response.study import CLEARLY, FINE_GAP, PER_TERM, DatedEnclosure, Found, Study
 from shoal.trajectory import Array
 
-SHARE = 1.25
-"""Runs for every term, at least."""
 HOPELESS = 0.4
 """Instants whose gap is above this share of the width when a fair number of runs is made lie beyond the horizon."""
 ENOUGH = 4
@@ -36,12 +34,6 @@ SPARED = 20
 """One in so many of the fair number of runs is kept for extremal points of the last degree."""
 MISSED = {2: 0.1, 4: 0.01}
 """More terms than runs are tried where a polynomial of so many degrees or more misses so much of the width."""
-CLEARLY = 0.5
-"""Share of the error of a polynomial that one of lower degree has to have to take its place; and of the error of one of
-more terms than runs that a polynomial has to have to keep its own.
-"""
-APART = 1e-3
-"""Germs that are nearer to each other are one extremal point."""
 MORE = 8
 """Times the fair number of runs: no study goes beyond that by itself."""
 
@@ -79,7 +71,7 @@ def bounds(study: Study) -> Found:
             here = replace(here, error=study.beside(np.maximum(here.error, missed)), enclosed=None)
             here, _ = _grown(plan, _round(plan, degree, here.decay), degree)
     top = int(here.surrogate.terms.sum(axis=1).max())
-    kind = "regularised " if len(here.surrogate.terms) > len(runs.xi) / SHARE else ""
+    kind = "regularised " if len(here.surrogate.terms) > len(runs.xi) / PER_TERM else ""
     why = f"{kind}polynomials of total degree {top}; their extremal points are run and entered into the fit{plan.why}"
     return Found(why, here.surrogate, here.error, enclosed=here.enclosed)
 
@@ -101,11 +93,11 @@ def _next(plan: Screened, degree: int) -> int:
     study = plan.study
     made = len(study.runs.xi)
     wanted = degree + 1
-    while SHARE * plan.size(wanted + 1) <= made and wanted - degree < 3:
+    while PER_TERM * plan.size(wanted + 1) <= made and wanted - degree < 3:
         wanted += 1
     if wanted >= HIGHEST or study.runs.own > MORE * plan.fair:
         raise TooManyRunsError
-    missing = math.ceil(SHARE * plan.size(wanted)) - made
+    missing = math.ceil(PER_TERM * plan.size(wanted)) - made
     if made < plan.fair:
         # Extremal points come after these, and the fair number holds both.
         missing = min(missing, plan.fair - made - max(1, plan.fair // SPARED))
@@ -117,7 +109,7 @@ def _next(plan: Screened, degree: int) -> int:
 
 def _carried(plan: Screened, degree: int) -> bool:
     """Return whether the good runs there are carry that degree."""
-    return len(plan.study.runs.xi) >= SHARE * plan.size(degree)
+    return len(plan.study.runs.xi) >= PER_TERM * plan.size(degree)
 
 
 def _fit_columns(plan: Screened, degree: int) -> Expansion:

@@ -17,7 +17,7 @@ from shoal.response.inputs import BoolArray
 from shoal.response.polynomials import size
 from shoal.response.regularised import likeliest, regularised, trimmed
 from shoal.response.statistics import moment_errors
-from shoal.response.study import Found, Study
+from shoal.response.study import CONVERGED, RUNS, Found, Study
 from shoal.response.transformations import Transformed, compared, transformed, untransformed
 from shoal.trajectory import Array
 
@@ -25,10 +25,6 @@ SHARE = 2.0
 """Runs for every term, at least."""
 FIRST = 128
 """Runs to begin with; they are doubled."""
-RUNS = 300
-"""That are made unless the expansion is coarse by then."""
-CONVERGED = 1e-4
-"""Error at runs that are left out of a fit, as a share of the standard deviation, that is good enough."""
 COARSE = 3e-2
 """Above this share, more runs are made: so many times."""
 MORE = 5

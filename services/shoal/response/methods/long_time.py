@@ -21,7 +21,7 @@ from shoal.response.extremes import Surrogate
 from shoal.response.inputs import IntArray
 from shoal.response.polynomials import Terms, size, total_degree
 from shoal.response.runs import TooManyRunsError
-from shoal.response.study import FINE_GAP, SAFETY, Found, Study
+from shoal.response.study import CLEARLY, FINE_GAP, PER_TERM, SAFETY, Found, Study
 from shoal.trajectory import Array
 
 SAMPLES = 2**15
@@ -169,15 +169,11 @@ def refuse_without_course(study: Study, method: str) -> None:
         raise InputError(f"method: {method} follows runs over time; this model is known at its instants only")
 
 
-SHARE = 1.25
-"""Runs for every term, at least; with one parameter as many as terms will do."""
 STRETCHES = 1.05, 1.2, 1.6
 """Runs are so many times as long as asked for: the slowest has to reach the phase of the fastest."""
 HIGHEST = 12
 OFF = 2e-2
 """Share of the width above which a surrogate is no good."""
-HELPS = 0.5
-"""A degree that leaves more than this share of the error does not help; two in a row are enough."""
 
 
 class TooSlowError(Exception):
@@ -230,7 +226,7 @@ def _grown(study: Study, make: Callable[[Watch], LongTime], seen: Watch) -> Foun
             error = study.largest(missed, study.runs.values)
             share = _share(study, error)
             why = f"{kind.name} of degree {degree}, fitted to {made} of {study.runs.evaluations} runs"
-            worse = 0 if found is None or share < HELPS * found.share else worse + 1
+            worse = 0 if found is None or share < CLEARLY * found.share else worse + 1
             if found is None or share < found.share:
                 found = Found(why, surrogate, error, of_cycles=True, share=share)
             dear = study.gap is None and study.runs.own > 2 * study.fair
@@ -268,13 +264,13 @@ def _share(study: Study, error: Array) -> float:
 
 def _carried(parameters: int, degree: int, runs: int) -> bool:
     """Return whether so many runs carry that degree."""
-    return runs >= (1 if parameters == 1 else SHARE) * size(parameters, degree)
+    return runs >= (1 if parameters == 1 else PER_TERM) * size(parameters, degree)
 
 
 def missing(study: Study, seen: Watch, terms: Terms) -> Array:
     """Return further places for these terms."""
     parameters, xi = len(study.inputs), np.array(seen.xi)
-    least = len(terms) if parameters == 1 else math.ceil(SHARE * len(terms))
+    least = len(terms) if parameters == 1 else math.ceil(PER_TERM * len(terms))
     return box_design(study.inputs, xi, terms, least - len(xi), study.seed)
 
 

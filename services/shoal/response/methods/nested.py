@@ -20,7 +20,7 @@ import numpy as np
 from shoal.errors import ComputationError, InputError
 from shoal.response.enclosure import bounds_of
 from shoal.response.expansion import Expansion, choose_degree, hidden, outwards
-from shoal.response.extremes import MOST_CORNERS, Extremes, corners, extremes
+from shoal.response.extremes import HELD, MOST_CORNERS, Extremes, corners, extremes
 from shoal.response.inputs import BoolArray, Inputs, IntArray
 from shoal.response.methods.bounds import bounds
 from shoal.response.methods.quadrature import rule
@@ -39,19 +39,15 @@ from shoal.response.probability_boxes import (
     std_gap,
 )
 from shoal.response.runs import Answers, CachedModel, TimeIsUpError, TooManyRunsError
-from shoal.response.study import SAFETY, Found, Study
+from shoal.response.study import CONVERGED, RUNS, SAFETY, Found, Study
 from shoal.trajectory import Array
 
 SHARE = 1.6
 """Runs for every term, at least."""
 FIRST = 64
 """Runs to begin with, see `control`; they are doubled."""
-RUNS = 300
-"""That are made unless the expansion is coarse by then."""
 COARSE, MORE = 1e-2, 6
 """Above this gap more runs are made: so many times."""
-FINE = 1e-4
-"""The gap that is aimed at where none is asked for: a share of the scatter."""
 DECIDING_RUNS = 8
 """Runs at each of the interval values that decide, and one more for each random parameter."""
 APART = 0.15
@@ -65,7 +61,7 @@ def nested(study: Study) -> Found:
     inputs, runs = study.inputs, study.runs
     if not inputs.mixed:
         raise InputError("vary: method nested needs an interval and a distribution; auto takes either alone")
-    fair, wanted = study.count or RUNS, study.gap or FINE
+    fair, wanted = study.count or RUNS, study.gap or CONVERGED
     most = fair if study.count else MORE * fair
     made, decided = 0, 0
     count = max(FIRST, math.ceil(SHARE * size(len(inputs), study.degree or 1)))
@@ -184,8 +180,6 @@ ONE_IN = 40
 """One in so many of the runs that are left, at most, may be those of one rule."""
 INNER_GAP = 0.01
 """Of the largest width of means and of variances, that is aimed at."""
-HELD = 4_000_000
-"""Numbers that are held at once."""
 
 
 @dataclass(frozen=True)

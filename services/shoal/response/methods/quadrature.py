@@ -11,12 +11,13 @@ import numpy as np
 from scipy.linalg import eigh_tridiagonal
 
 from shoal.errors import InputError
+from shoal.response.enclosure import CONTROLS
 from shoal.response.expansion import Expansion
-from shoal.response.inputs import Inputs
+from shoal.response.inputs import ENDS, Inputs
 from shoal.response.polynomials import Recurrence, tensor
 from shoal.response.runs import TimeIsUpError
-from shoal.response.statistics import SURE
-from shoal.response.study import Found, Study
+from shoal.response.statistics import CONFIDENCE
+from shoal.response.study import CONVERGED, Found, Study
 from shoal.trajectory import Array
 
 FIRST = {1: 8, 2: 6}
@@ -24,14 +25,10 @@ FIRST = {1: 8, 2: 6}
 MOST = {1: 256, 2: 576}
 """Runs of one rule. A uniform parameter has as many points. Of 1024 points of a normal one 143 are not negligible; they
 resolve a phase that spreads by 20 rad."""
-NEGLIGIBLE = 1e-12
+NEGLIGIBLE = ENDS[0]
 """Weight below which a point needs no run: about seven standard deviations out, where values may be impossible."""
-CONVERGED = 1e-4
-"""Difference of two rules, as a share of the standard deviation, that is good enough."""
 ROUGH = 10.0
 """So many times that share runs that are drawn may be off, as those of other methods that are good enough are."""
-CONTROLS = 64
-"""Runs that are drawn from the distributions: points of a rule may all miss a part of them."""
 
 
 def gauss(recurrence: Recurrence, count: int) -> tuple[Array, Array]:
@@ -102,7 +99,7 @@ def _controlled(study: Study, found: Expansion, apart: Array, count: int) -> Fou
     missed = np.sqrt(np.mean((found(runs.xi[made:]) - values) ** 2, axis=0))
     if np.any(missed > ROUGH * CONVERGED * study.largest(np.sqrt(found.variance), values)):
         return None
-    error = apart + SURE * missed / np.sqrt(CONTROLS)
+    error = apart + CONFIDENCE * missed / np.sqrt(CONTROLS)
     why = f"Gauss quadrature with {count} points in each parameter; {CONTROLS} drawn runs control it"
     return Found(why, found, missed, errors=(error, error), drawn=CONTROLS)
 
