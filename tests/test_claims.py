@@ -188,3 +188,11 @@ def test_every_generated_part_has_a_study() -> None:
     for page, text in PAGES.items():
         if parts := re.findall(r"<!-- begin (\S+) -->", text):
             assert any(f"docs/{of}" == page for study in STUDIES.values() for of in study.pages), (page, parts)
+
+
+def test_files_of_the_map_for_newcomers_are_there() -> None:
+    (tree,) = re.findall(r"```text\n(.*?)```", PAGES["docs/extend/index.md"], re.S)
+    known = [path.as_posix() for path in SOURCES]
+    files = re.findall(r"[\w/]+\.py\b", tree)
+    assert len(files) > 20
+    assert [file for file in files if not any(place.endswith(f"/{file}") for place in known)] == []

@@ -48,9 +48,9 @@ def _watched(_: float, name: str) -> Watched:
 
 STEP = StabilityMap(
     "space-step",
-    "Which step does each method bear on rigid machines in space?",
-    "The spin of 150 rad/s of the heavy top asks for the shortest steps. Energy tells of what is too long, where "
-    "Exudyn's own word does not.",
+    "How long may the steps of each method be on rigid machines in space?",
+    "The spin of 150 rad/s of the heavy top asks for the shortest steps. The energy check finds "
+    "steps that are too long; Exudyn's own status does not.",
     Axis("step", "s", (1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1)),
     Axis("machine", "", ("spherical-pendulum", "heavy-top", "bricard")),
     (*FIXED_STEP, *both(*EXUDYN)),
@@ -70,10 +70,10 @@ def _top(_: float, spin: float) -> Watched:
 
 SPIN = StabilityMap(
     "space-spin",
-    "Which step does each method bear as a top turns faster?",
+    "How long may the steps of each method be as a top turns faster?",
     "Directions as coordinates turn with the body, so that a step has to be a fraction of a turn: at 1000 rad/s up "
     "to a radian with energy-momentum, a third with rk4, a hundredth with leapfrog, which gains energy. Exudyn's "
-    "rotations bear a third. What is too long ends in a status.",
+    "rotations allow a third. Longer steps end with a status.",
     Axis("step", "s", (1e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2)),
     Axis("spin of the top", "rad/s", (1.0, 10.0, 100.0, 1000.0, 10_000.0)),
     (*FIXED_STEP, *both(*EXUDYN)),

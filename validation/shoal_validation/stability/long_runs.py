@@ -54,7 +54,7 @@ def _path(horizon: float) -> Array:
 CHAOTIC = StabilityMap(
     "chaos",
     "How far ahead can a chaotic machine be computed?",
-    "Every digit of accuracy buys the same span of time. Energy does not tell where the span ends.",
+    "Every digit of accuracy buys the same span of time. The energy does not show where the span ends.",
     Axis("horizon", "s", (1.0, 2.0, 4.0, 6.0, 8.0, 10.0)),
     Axis("step", "s", (1e-3, 5e-3, 2e-2, 5e-2)),
     (*FIXED_STEP, *ADAPTIVE, *both(*EXUDYN, CASADI_RK4), CASADI_CVODES),

@@ -36,7 +36,7 @@ def _pendulum(_: float, slenderness: float) -> Watched:
 
 SLENDERNESS = StabilityMap(
     "space-slenderness",
-    "Which step does each method bear as rods in space get thinner?",
+    "How long may the steps of each method be as rods in space get thinner?",
     "As in the plane the stretching of the cables sets the explicit limit, at every thickness. Implicit methods, ours "
     "and Exudyn's alike, hold up to 0.01 s.",
     Axis("step", "s", (1e-4, 2e-4, 5e-4, 1e-3, 3e-3, 1e-2)),
@@ -86,8 +86,8 @@ TWIST = StabilityMap(
     "space-twist",
     "Which mesh does a rod need that is twisted at rest?",
     "From four elements on, and with a radian or so of twist in each, a director rod is within a thousandth; Exudyn's "
-    "pairs of beams need twice as many. Beyond half a turn an element cannot tell which way its section turned. A rod "
-    "of one element and 24 rad was off by a fifth of its length and said ok, so that such meshes are refused.",
+    "pairs of beams need twice as many. Beyond half a turn in an element the direction of its twist is ambiguous. "
+    "A rod of one element and 24 rad was off by a fifth of its length and said ok, so that such meshes are refused.",
     Axis("elements", "", (1, 2, 4, 8)),
     Axis("twist from end to end", "rad", (0.0, 3.0, 6.0, 12.0, 24.0)),
     (

@@ -65,7 +65,7 @@ ACCELERATION = StabilityMap(
     "Which way to the acceleration passes a singular position, however near it starts?",
     "With drift removed after every step all ways but kkt hold at every distance and mass. kkt has no answer near "
     "the position once the cranks are unlike, and says so; equal cranks hide it. Left to drift, only Baumgarte's "
-    "way holds. The others leave the branch or their numbers, and the checks tell.",
+    "way holds. The others leave the branch or diverge, and the checks find it.",
     DISTANCES,
     MASSES,
     (*(way(name, project) for project in (True, False) for name in WAYS), *ADAPTIVE, *both(*EXUDYN)),

@@ -35,7 +35,7 @@ def _watched(_: float, name: str) -> Watched:
 MACHINES = Axis("machine", "", tuple(SIZES))
 STEP = StabilityMap(
     "step-machine",
-    "Which step does each method bear on machines that pass singular positions or saddle points?",
+    "How long may the steps of each method be on machines that pass singular positions or saddle points?",
     "Machines that come to stand near their highest point multiply every error. There energy says little about the "
     "motion, least of all with a method that keeps it by construction.",
     Axis("step", "s", (1e-3, 3e-3, 1e-2, 2e-2, 5e-2, 1e-1)),

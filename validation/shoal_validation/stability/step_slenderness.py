@@ -14,7 +14,7 @@ def _change(slenderness: float) -> dict[str, object]:
 
 STEP = step_map(
     "step-slenderness",
-    "Which step does each method bear as the rods get thinner?",
+    "How long may the steps of each method be as the rods get thinner?",
     "The explicit limit is the same at every thickness: the stretching of the cable elements sets it. Thin rods "
     "flutter, and implicit steps that do not resolve this lose energy or phase. Engines without a limit of the "
     "step go on beyond it.",

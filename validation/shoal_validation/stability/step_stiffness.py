@@ -14,9 +14,9 @@ def _change(factor: float) -> dict[str, object]:
 
 STEP = step_map(
     "step-stiffness",
-    "Which step does each method bear as the rods get stiffer?",
+    "How long may the steps of each method be as the rods get stiffer?",
     "An explicit method is refused along a diagonal: its longest step falls with the root of the stiffness. Implicit "
-    "ones are limited by the motion, not by the stiffness. Implicit Gauss damps the motion, as its energy tells. "
+    "ones are limited by the motion, not by the stiffness. Implicit Gauss damps the motion, which its energy shows. "
     "Capped inertia stretches the step of leapfrog three- to tenfold; beyond, where it slows what moves the machine, "
     "the second run rejects it.",
     FACTORS,
