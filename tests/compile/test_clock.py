@@ -91,6 +91,6 @@ def test_it_stands_still_while_other_processes_compile(at: list[float], monkeypa
     monkeypatch.setattr(warm, "_compile", compiles)
     monkeypatch.setattr(warm.KernelSignature, "cached", False)
     begin, said = clock.now(), list[str]()
-    warm.ahead([warm.KernelSignature("loop", ())], said.append)
+    warm.ahead([warm.KernelSignature("shoal.mechanics.march", "loop", ())], said.append)
     assert clock.now() == begin
     assert "loop (1 of 1" in said[1]

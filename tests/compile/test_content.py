@@ -162,13 +162,13 @@ def test_all_processes_have_the_same_keys() -> None:
 
 
 def test_a_kernel_depends_on_the_kind_of_structure_that_it_is_compiled_for() -> None:
-    """Of the integrators a time loop holds its own: an edit of another one leaves it as it is."""
-    from shoal.mechanics.integrators import leapfrog, rk4
-    from shoal.mechanics.integrators.scheme import advance
-    from shoal.mechanics.march import loop
+    """The force kernel of a family holds its own elements: an edit of others leaves it as it is."""
+    from shoal.mechanics.elements import cubic, quintic
+    from shoal.mechanics.elements.families import add_force
+    from shoal.mechanics.kernels import _force
 
     def reached(kind: type) -> set[Any]:
-        seen, pending = set(), [loop.py_func]
+        seen, pending = set(), [_force.py_func]
         while pending:
             function = pending.pop()
             if function not in seen:
@@ -176,10 +176,23 @@ def test_a_kernel_depends_on_the_kind_of_structure_that_it_is_compiled_for() -> 
                 pending += content._parts(function, frozenset([kind]))[1]
         return seen
 
-    assert advance in reached(rk4.Rk4)
-    assert rk4.step.py_func in reached(rk4.Rk4) - reached(leapfrog.Leapfrog)
-    assert leapfrog.step.py_func in reached(leapfrog.Leapfrog) - reached(rk4.Rk4)
-    assert content.key(loop.py_func, "Rk4") != content.key(loop.py_func, "Leapfrog")
+    assert add_force in reached(cubic.Cubics)
+    assert cubic.force.py_func in reached(cubic.Cubics) - reached(quintic.Quintics)
+    assert quintic.force.py_func in reached(quintic.Quintics) - reached(cubic.Cubics)
+    assert content.key(_force.py_func, "Cubics") != content.key(_force.py_func, "Quintics")
+
+
+def test_a_time_loop_depends_on_no_integrator() -> None:
+    from shoal.mechanics.integrators.scheme import IMPLEMENTATIONS
+    from shoal.mechanics.march import loop
+
+    seen, pending = set(), [loop.py_func]
+    while pending:
+        function = pending.pop()
+        if function not in seen:
+            seen.add(function)
+            pending += content._parts(function, frozenset())[1]
+    assert not seen & {kernels.step.py_func for kernels in IMPLEMENTATIONS.values()}
 
 
 @pytest.mark.slow
@@ -216,11 +229,11 @@ def followed(function, chosen):
     return seen
 
 scene = load_scene("parallelogram").with_values({{"solver.integrator": "{integrator}"}})
-kernel = next(one for one in warm.required(scene, 1) if one.name == "loop")
+kernel = next(one for one in warm.required(scene, 1) if one.name == "step")
 before = compiled()
-warm.loop.compile(kernel.kinds)
+kernel.function.compile(kernel.kinds)
 parts = {{function for function, count in compiled().items() if count > before.get(function, 0)}}
 text = " ".join(map(content._text, kernel.kinds))
 kinds = {{kind for pairs in content.ALTERNATIVES.values() for kind, _ in pairs if kind.__name__ in text}}
-print(len(parts), len(parts - followed(warm.loop.py_func, frozenset(kinds))))
+print(len(parts), len(parts - followed(kernel.function.py_func, frozenset(kinds))))
 """

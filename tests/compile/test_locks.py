@@ -11,9 +11,8 @@ import numpy as np
 import pytest
 from numba import njit
 from shoal.compile import locks, progress
-from shoal.mechanics import kernels, warm
+from shoal.mechanics import warm
 from shoal.mechanics.assembly.build import build
-from shoal.mechanics.march import loop
 from shoal.mechanics.model import FunctionTable
 from shoal.mechanics.numerics.tile import SINGLE
 from shoal.mechanics.simulate import simulate
@@ -99,8 +98,7 @@ def test_what_is_compiled_ahead_is_what_a_run_calls(scene: Scene, lanes: int) ->
     simulate(scene, np.array([1e-3]), values)
     for kernel in warm.required(scene, lanes):
         if kernel.name != "_stiffness":
-            function = loop if kernel.name == "loop" else getattr(kernels, kernel.name)
-            assert kernel.kinds in function.overloads, kernel.name
+            assert kernel.kinds in kernel.function.overloads, kernel.name
             assert kernel.cached
 
 

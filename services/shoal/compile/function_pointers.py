@@ -16,17 +16,27 @@ from numba.extending import intrinsic
 @intrinsic
 def call(typing_context, address, arguments):  # type: ignore[no-untyped-def]
     """Call the kernel at an address with a tuple of arguments; it returns nothing."""
+    return _call(types.none, address, arguments)
+
+
+@intrinsic
+def ask(typing_context, address, arguments):  # type: ignore[no-untyped-def]
+    """Call the kernel at an address with a tuple of arguments and return the number that it returns."""
+    return _call(types.float64, address, arguments)
+
+
+def _call(result: Any, address: Any, arguments: Any) -> Any:
     kinds = tuple(arguments)
 
-    def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         where, packed = values
         parts = [builder.extract_value(packed, k) for k in range(len(kinds))]
-        kind = context.call_conv.get_function_type(types.none, kinds)
+        kind = context.call_conv.get_function_type(result, kinds)
         function = builder.inttoptr(where, ir.PointerType(kind))
-        context.call_conv.call_function(builder, function, types.none, kinds, parts)
-        return context.get_dummy_value()
+        _, value = context.call_conv.call_function(builder, function, result, kinds, parts)
+        return value
 
-    return types.void(address, arguments), generate
+    return result(address, arguments), generate
 
 
 @intrinsic

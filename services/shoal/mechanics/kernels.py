@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 from numba import njit, typeof, types
 
-from shoal.compile import locks
-from shoal.compile.function_pointers import address, call
+from shoal.compile import function_pointers, locks
+from shoal.compile.function_pointers import call
 from shoal.compile.pointers import raw_type
 from shoal.compile.structures import Reference, leading, storage
 from shoal.mechanics import dynamics
@@ -158,7 +158,7 @@ _FAMILY_KERNELS: dict[str, Kernel] = {
 """Kernels of one family of elements, and the types of their arguments after the tile and the family."""
 
 locks.install()
-_FOUND: dict[tuple[str, int, type, int], int] = {}
+_FOUND: dict[tuple[Any, ...], int] = {}
 _READY: dict[tuple[int, int, bool, tuple[bool, ...]], FunctionTable] = {}
 
 
@@ -220,11 +220,16 @@ def planned() -> Iterator[None]:
 
 
 def _address(name: str, tile: Tile, *parts: Any) -> int:
+    key = name, len(tile), type(parts[0]), len(getattr(parts[0], "space", ()))
+    return address(key, lambda: _kernel(name, tile, *parts))
+
+
+def address(key: tuple[Any, ...], kernel: Callable[[], Kernel]) -> int:
+    """Return where a kernel is, found by a key that is quicker to make than its types; 0 while planning."""
     if _planning.get():
         return 0
-    key = name, len(tile), type(parts[0]), len(getattr(parts[0], "space", ()))
     if key not in _FOUND:
-        _FOUND[key] = address(*_kernel(name, tile, *parts))
+        _FOUND[key] = function_pointers.address(*kernel())
     return _FOUND[key]
 
 

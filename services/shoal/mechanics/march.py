@@ -5,7 +5,7 @@
           ── _account ─ what loads, dampers and drives did in the step
           ── _look ─ kernels.energies, constraints.drift
 
-An integrator's step stands in its own file; `integrators.scheme` chooses it by the type of its settings. A step is cut
+An integrator's step stands in its own file; `integrators.scheme` calls it by its address. A step is cut
 short where functions of time are not smooth (`halts`). The compiled loop runs for a fraction of a second at a time and
 goes on where it has paused (`marched.Progress`), so that signals are heard and a hopeless run is ended.
 """
@@ -25,7 +25,7 @@ from shoal.mechanics import constraints, kernels
 from shoal.mechanics.derived import derive
 from shoal.mechanics.dynamics import Work, loaded, remember
 from shoal.mechanics.halts import RESOLUTION, Halts, elongations, leapt
-from shoal.mechanics.integrators.scheme import adaptive, advance, averages, interpolate, restart
+from shoal.mechanics.integrators.scheme import Scheme, advance, interpolate, restart
 from shoal.mechanics.least.work import HERE
 from shoal.mechanics.marched import (
     BEGUN,
@@ -143,7 +143,7 @@ def loop(frame):  # type: ignore[no-untyped-def]
     times, marker_rows = carray(frame.times, frame.samples), carray(frame.marker_rows, frame.directed)
     stops, marks = carray(frame.halts.times, frame.stops), carray(frame.halts.marks, frame.marks)
     halts = Halts(stops, frame.halts.start, marks)
-    free, last, own = adaptive(scheme), halts.times.size - 1, k.progress
+    free, last, own = scheme.adaptive, halts.times.size - 1, k.progress
     if own[BEGUN] == 0.0:
         w.until[0] = np.nextafter(halts.times[0], 0.0) if last >= 0 else np.inf
         _begin(tile, m, w, k, record, marker_rows, tolerance)
@@ -223,7 +223,7 @@ def _begin(tile: Tile, m: Arrays, w: Work, k: LoopRoom, record: Marched, marker_
 @njit(cache=True, error_model="numpy")
 def _sample(
     tile: Tile,
-    scheme: Any,
+    scheme: Scheme,
     m: Arrays,
     w: Work,
     k: LoopRoom,
@@ -266,7 +266,7 @@ def _sample(
 
 @njit(cache=True, error_model="numpy")
 def _leave_halt(
-    tile: Tile, scheme: Any, m: Arrays, w: Work, k: LoopRoom, now: float, tolerance: float, scale: Array
+    tile: Tile, scheme: Scheme, m: Arrays, w: Work, k: LoopRoom, now: float, tolerance: float, scale: Array
 ) -> None:
     """Go on from a time at which forces or driven rates jump: these are taken up at once, for what energy it takes."""
     restart(scheme)
@@ -286,7 +286,7 @@ def _leave_halt(
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _advance(
     tile: Tile,
-    scheme: Any,
+    scheme: Scheme,
     m: Arrays,
     w: Work,
     k: LoopRoom,
@@ -302,14 +302,14 @@ def _advance(
     """
     end = m.unknowns * len(tile)
     watched = halts.marks.size > 0
-    if keep or watched or (adaptive(scheme) and loaded(m)):
+    if keep or watched or (scheme.adaptive and loaded(m)):
         for i in range(end):
             k.past[i], k.past[end + i], k.past[2 * end + i] = w.z[i], w.zdot[i], w.a[i]
     if watched:
         derive(tile, m.derived, w.z, m.unknowns, m.force_rows, False)
         elongations(tile, m.forces, w.z, w.memory, w.element, k.elongation)
-    taken = rest
-    while True:  # one call of `advance`, as the compiler puts the whole step of the integrator in place of each
+    taken: float = rest
+    while True:
         taken = advance(tile, scheme, m, w, now, taken)
         if not watched or taken <= snap:
             return taken
@@ -324,10 +324,10 @@ def _advance(
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _account(
-    tile: Tile, scheme: Any, m: Arrays, w: Work, k: LoopRoom, begin: float, taken: float, tolerance: float
+    tile: Tile, scheme: Scheme, m: Arrays, w: Work, k: LoopRoom, begin: float, taken: float, tolerance: float
 ) -> None:
     """Add what was dissipated less what was supplied in the step [J]: its mean power, or a quadrature over it."""
-    width, free = len(tile), adaptive(scheme)
+    width, free = len(tile), scheme.adaptive
     for lane in range(width):
         k.power[lane] = w.power[lane]
     if free:
@@ -341,7 +341,7 @@ def _account(
                 k.dissipated[lane] += taken * 5.0 / 12.0 * w.power[lane]
     weight = 1.0 / 12.0 if free else 0.5
     for lane in range(width):
-        other = k.power[lane] if averages(scheme) else k.last_power[lane]
+        other = k.power[lane] if scheme.averages else k.last_power[lane]
         k.dissipated[lane] += weight * taken * (other + k.power[lane])
         k.last_power[lane] = k.power[lane]
 

@@ -12,6 +12,7 @@ from shoal.compile.structures import Reference
 from shoal.mechanics import constraints
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.halts import Halts
+from shoal.mechanics.integrators.scheme import Scheme
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics.tile import Array, Index, Tile
 
@@ -127,7 +128,7 @@ class Frame(NamedTuple):
     """
 
     tile: Tile
-    scheme: Any
+    scheme: Scheme
     arrays: Arrays
     room: Work
     own: LoopRoom
@@ -146,7 +147,7 @@ class Frame(NamedTuple):
 
 def framed(
     tile: Tile,
-    scheme: Any,
+    scheme: Scheme,
     arrays: Arrays,
     room: Work,
     step: float,
@@ -166,9 +167,9 @@ def framed(
     )  # fmt: skip
 
 
-def loop_of(frame: Frame) -> tuple[Any, ...]:
+def loop_of(frame: Frame) -> tuple[int, int]:
     """Return the key of a frame's type: frames with equal keys share a compiled loop."""
-    return len(frame.tile), len(frame.arrays.space), type(frame.scheme), *map(type, frame.arrays.elements)
+    return len(frame.tile), len(frame.arrays.space)
 
 
 def frame_type(frame: Frame) -> Any:

@@ -20,7 +20,7 @@ from numba import config
 
 from shoal.children import end_with_parent
 from shoal.compile import clock
-from shoal.compile.locks import SECONDS, described
+from shoal.compile.locks import described, seconds
 from shoal.compile.progress import Note, reporting_to
 from shoal.errors import ShoalError
 from shoal.mechanics import kernels
@@ -28,6 +28,7 @@ from shoal.mechanics.analysis import evaluations
 from shoal.mechanics.assembly.build import build
 from shoal.mechanics.dynamics import work_space
 from shoal.mechanics.integrators import INTEGRATORS, choose, facts, halting
+from shoal.mechanics.integrators.scheme import connect, signatures
 from shoal.mechanics.march import loop
 from shoal.mechanics.marched import frame_type, framed
 from shoal.mechanics.numerics.tile import SINGLE, tiles
@@ -42,18 +43,24 @@ they are first used."""
 class KernelSignature(NamedTuple):
     """A kernel by its name, and the types of its arguments."""
 
+    module: str
     name: str
     kinds: tuple[Any, ...]
 
     @property
+    def function(self) -> Any:
+        """The function that is compiled."""
+        return getattr(sys.modules[self.module], self.name)
+
+    @property
     def seconds(self) -> float:
         """About how long it takes to compile."""
-        return SECONDS.get(self.name, 1.0)
+        return seconds(self.name, self.kinds)
 
     @property
     def cached(self) -> bool:
         """Return whether the cache has it."""
-        function = _function(self.name)
+        function = self.function
         found = function._cache
         return found._index_key(self.kinds, function.targetctx.codegen()) in found._cache_file._load_index()
 
@@ -139,29 +146,24 @@ def required(scene: Scene, lanes: int, *, every: bool = False) -> list[KernelSig
     arrays = model.tile(tile, lane)
     room = work_space(tile, arrays)
     with kernels.planned():
-        scheme = choose(scene.solver, model, tile, lane, name)
+        settings = choose(scene.solver, model, tile, lane, name)
+        scheme = connect(tile, settings, arrays, room)
     stops = halting(scene.solver, model, name, scene.solver.duration)
     frame = framed(tile, scheme, arrays, room, 0.0, 0, np.zeros(1), model.marker_rows.ravel(), 0.0, stops)
-    shared = [
-        KernelSignature(kernel.__name__, kinds) for kernel, kinds in kernels.signatures(tile, arrays, room, every=every)
-    ]
-    if lanes > 1 and not every:  # lanes mostly differ in their start alone, and share one stability limit
-        shared = [kernel for kernel in shared if kernel.name != "_stiffness"]
+    found = [(loop, (frame_type(frame),)), *signatures(tile, settings, arrays, room)]
+    found += kernels.signatures(tile, arrays, room, every=every)
     if every and tile == SINGLE:  # statics, modes and reactions
-        shared += [
-            KernelSignature(kernel.__name__, kinds) for kernel, kinds in evaluations.signatures(tile, arrays, room)
-        ]
-    return [KernelSignature(loop.__name__, (frame_type(frame),)), *shared]
-
-
-def _function(name: str) -> Any:
-    return loop if name == loop.__name__ else getattr(kernels, name, None) or getattr(evaluations, name)
+        found += evaluations.signatures(tile, arrays, room)
+    named = [KernelSignature(kernel.__module__, kernel.__name__, kinds) for kernel, kinds in found]
+    if lanes > 1 and not every:  # lanes mostly differ in their start alone, and share one stability limit
+        named = [kernel for kernel in named if kernel.name != "_stiffness"]
+    return named
 
 
 def _compile(kernel: KernelSignature) -> str:
     begin = time.perf_counter()
-    _function(kernel.name).compile(kernel.kinds)
-    return f"{described(*kernel)}: {time.perf_counter() - begin:.1f} s"
+    kernel.function.compile(kernel.kinds)
+    return f"{described(kernel.name, kernel.kinds)}: {time.perf_counter() - begin:.1f} s"
 
 
 def _lanes(name: str) -> tuple[int, ...]:

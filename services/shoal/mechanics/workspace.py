@@ -13,6 +13,7 @@ from shoal.mechanics import forces, states
 from shoal.mechanics.dynamics import Work, derived_rows, work_space
 from shoal.mechanics.halts import Halts
 from shoal.mechanics.integrators import Choice, choose, facts
+from shoal.mechanics.integrators.scheme import connect
 from shoal.mechanics.kernels import Seek, Sought, ready
 from shoal.mechanics.least.principle import PROJECTION
 from shoal.mechanics.march import March
@@ -86,12 +87,14 @@ class Workspace:
             room = lean(arrays, room)
         if spare:
             arrays = arrays._replace(elements=tuple(family._replace(spare=spare) for family in arrays.elements))
-        scheme = choose(solver, model, tile, part, choice.name)
+        settings = choose(solver, model, tile, part, choice.name)
         steps = solver.max_steps if facts(choice.name).adaptive else int(np.ceil(times[-1] / solver.step - 1e-9))
         rows = np.concatenate([model.marker_rows.ravel(), states.rows(model)]) if whole else model.marker_rows.ravel()
+        scheme = connect(tile, settings, arrays, room)
         frame = framed(tile, scheme, arrays, room, solver.step, steps, times.copy(), rows, solver.rank_tolerance, halts)
-        own = frame.room, frame.scheme, frame.own, frame.record
-        self._block, (room, scheme, loop, record) = gathered(own)
+        own = frame.room, settings, frame.own, frame.record
+        self._block, (room, self._settings, loop, record) = gathered(own)
+        scheme = connect(tile, self._settings, arrays, room)
         frame = frame._replace(room=room, scheme=scheme, own=loop, record=record)
         self._sought = None if seek is None else Sought(seek(arrays, room), model.unknowns)
         if self._sought is not None:

@@ -1,8 +1,8 @@
-"""The functions every integrator provides, chosen by the type of its settings at compile time.
+"""The functions every integrator provides, which the time loop calls by their addresses.
 
 `advance(tile, scheme, m, w, t, h)` moves the state in w by one step, `interpolate` gives the motion inside
 the last step. An integrator is a file with a NamedTuple of settings, its declared facts, and a compiled
-function with the signature of `advance`; compiled code then contains only the integrator that is used.
+function with the signature of `advance`; the time loop is compiled once for all of them.
 
 Settings carry a field `evaluations`, (1,): how many times the step has evaluated the forces so far.
 """
@@ -12,10 +12,16 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba import njit, typeof, types
 
-from shoal.compile.choice import choose
+from shoal.compile import structures
+from shoal.compile.function_pointers import ask, call
+from shoal.compile.pointers import raw_type
+from shoal.compile.structures import Reference
+from shoal.mechanics import kernels
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.integrators import dense
+from shoal.mechanics.kernels import Kernel
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics.tile import Array, Tile
 
@@ -57,48 +63,91 @@ class Facts(NamedTuple):
     stages: int = 1
 
 
-def advance(tile: Tile, scheme: Any, m: Arrays, w: Work, t: float, h: float) -> float:
-    """Move the state at the time t by one step; returns the step taken [s]. Pointers.
+class Scheme(NamedTuple):
+    """An integrator as the time loop sees it: addresses of its kernels, storage of its settings, and two of its facts.
 
-    h: the step to take, or for adaptive schemes the rest of the run, which is the most they may take.
-    A scheme that cannot go on with a lane writes nan into its state.
+    forget: 0 where there are no earlier steps to forget. evaluations: the counter of the settings.
     """
-    raise NotImplementedError(type(scheme).__name__)
+
+    advance: int
+    interpolate: int
+    forget: int
+    adaptive: bool
+    averages: bool
+    settings: Array
+    evaluations: Array
 
 
-def interpolate(
-    tile: Tile, scheme: Any, m: Arrays, w: Work, past: Array, x: float, h: float, q: Array, v: Array
-) -> None:
-    """Coordinates and rates at the fraction x of the last step, of h [s], into q and v, (rows, lanes). Pointers.
+class Implementation(NamedTuple):
+    """Kernels of an integrator; forget: None where it keeps nothing of earlier steps."""
 
-    past: coordinates, rates and accelerations at its beginning, (3 * unknowns, lanes); those at its end are in w.
-    """
-    raise NotImplementedError(type(scheme).__name__)
-
-
-def restart(scheme: Any) -> None:
-    """Forget earlier steps: what follows does not continue them smoothly."""
-    raise NotImplementedError(type(scheme).__name__)
+    step: Any
+    inside: Any
+    forget: Any
+    facts: Facts
 
 
-def adaptive(scheme: Any) -> bool:
-    """Return whether the scheme chooses its steps itself."""
-    raise NotImplementedError(type(scheme).__name__)
-
-
-def averages(scheme: Any) -> bool:
-    """Return whether the scheme leaves the mean power of its step in w.power."""
-    raise NotImplementedError(type(scheme).__name__)
+IMPLEMENTATIONS: dict[type, Implementation] = {}
+"""By type of settings."""
 
 
 def implement(settings: type, step: Any, facts: Facts, inside: Any = dense.quintic, forget: Any = None) -> None:
     """Register kernels of an integrator by the type of its settings: `step`, and `inside` for the motion within it.
 
-    forget: discards the memory of earlier steps. The parameters of the kernels are named as those of `advance`,
-    `interpolate` and `restart`.
+    forget: discards the memory of earlier steps. The parameters of the kernels are those of `advance`, `interpolate`
+    and `restart`.
     """
-    choose(advance, settings, step, forceinline=True)
-    choose(interpolate, settings, inside)
-    choose(restart, settings, forget or (lambda scheme: None))
-    choose(adaptive, settings, (lambda scheme: True) if facts.adaptive else (lambda scheme: False))
-    choose(averages, settings, (lambda scheme: True) if facts.mean_power else (lambda scheme: False))
+    IMPLEMENTATIONS[settings] = Implementation(step, inside, forget, facts)
+
+
+def connect(tile: Tile, settings: Any, arrays: Arrays, room: Work) -> Scheme:
+    """Write settings where kernels read them, and compile their kernels or take them from the cache."""
+    own, storage = IMPLEMENTATIONS[type(settings)], structures.storage()
+    structures.write(storage, settings)
+
+    def address(number: int) -> int:
+        key = len(tile), len(arrays.space), type(settings), number
+        return kernels.address(key, lambda: signatures(tile, settings, arrays, room)[number])
+
+    step, inside, forget = (address(k) if own[k] else 0 for k in range(3))
+    return Scheme(step, inside, forget, own.facts.adaptive, own.facts.mean_power, storage, settings.evaluations)
+
+
+def signatures(tile: Tile, settings: Any, arrays: Arrays, room: Work) -> list[Kernel]:
+    """Return the kernels of an integrator with the types of their arguments: the step, the motion inside, `forget`."""
+    own = IMPLEMENTATIONS[type(settings)]
+    scheme, m, w = (Reference(raw_type(typeof(part))) for part in (settings, arrays, room))
+    number, rows, lanes = types.float64, types.CPointer(types.float64), typeof(tile)
+    # What interpolates between states alone looks at no settings, and is the same for all.
+    whose = rows if own.inside.py_func.__module__ == dense.__name__ else scheme
+    step = own.step, (lanes, scheme, m, w, number, number)
+    inside = own.inside, (lanes, whose, m, w, rows, number, number, rows, rows)
+    return [step, inside, *([(own.forget, (scheme,))] if own.forget else [])]
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def advance(tile: Tile, scheme: Scheme, m: Arrays, w: Work, t: float, h: float) -> float:
+    """Move the state at the time t by one step; returns the step taken [s]. Pointers.
+
+    h: the step to take, or for adaptive schemes the rest of the run, which is the most they may take.
+    A scheme that cannot go on with a lane writes nan into its state.
+    """
+    return ask(scheme.advance, (tile, scheme.settings, m, w, t, h))  # type: ignore[no-any-return]
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def interpolate(
+    tile: Tile, scheme: Scheme, m: Arrays, w: Work, past: Array, x: float, h: float, q: Array, v: Array
+) -> None:
+    """Coordinates and rates at the fraction x of the last step, of h [s], into q and v, (rows, lanes). Pointers.
+
+    past: coordinates, rates and accelerations at its beginning, (3 * unknowns, lanes); those at its end are in w.
+    """
+    call(scheme.interpolate, (tile, scheme.settings, m, w, past, x, h, q, v))
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def restart(scheme: Scheme) -> None:
+    """Forget earlier steps: what follows does not continue them smoothly."""
+    if scheme.forget != 0:
+        call(scheme.forget, (scheme.settings,))
