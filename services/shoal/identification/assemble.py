@@ -139,7 +139,7 @@ def _findings(
         *_refuted(judgement, predicted),
         *(judgement.findings or _ended(outcome)),
         *outcome.findings,
-        *(_beside(model, near, known, values) if judgement.verdict.trusted else []),
+        *(_beside(model, near, known, judgement, values) if judgement.verdict.trusted else []),
         *remarks(
             values,
             known.profiled,
@@ -168,10 +168,12 @@ def _ended(outcome: Outcome) -> list[Finding]:
     return [kinds.SEARCH_ENDED.found(outcome.message)] if outcome.message else []
 
 
-def _beside(model: ForwardModel, near: Evidence, known: Surroundings, values: dict[str, Value]) -> list[Finding]:
+def _beside(
+    model: ForwardModel, near: Evidence, known: Surroundings, judgement: Judgement, values: dict[str, Value]
+) -> list[Finding]:
     """Return what other friction laws would change of an answer, and what its intervals hold beyond noise."""
     laws = wider_by_other_laws(
-        known.laws, values, lambda law: intervals.parameters(model, law.end, near.at, near.correction)[law.sought]
+        judgement.laws, values, lambda law: intervals.parameters(model, law.end, near.at, near.correction)[law.sought]
     )
     return [*laws, *beyond_noise(values, known.profiled, near.tests)]
 

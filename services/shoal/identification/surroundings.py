@@ -9,7 +9,6 @@ import numpy as np
 from shoal.identification.deadline import unless_late
 from shoal.identification.diagnostics.judgement import Judgement
 from shoal.identification.diagnostics.minima.rivals import valley
-from shoal.identification.diagnostics.other_laws import OtherLaw, other_laws
 from shoal.identification.evidence import Evidence
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods.growth import FRACTAL, growth
@@ -25,14 +24,12 @@ from shoal.trajectory import Array
 class Surroundings:
     """What an answer shows of its parameters, before the verdict.
 
-    outcome: without the minima in the valley of the answer; ends: the answer, those minima, and where other laws of
-    friction would move it that a misfit may be due to: the intervals hold them all
+    outcome: without the minima in the valley of the answer; ends: the answer and those minima: the intervals hold all
     curved: parameters whose intervals are those of their profiles
     """
 
     outcome: Outcome
     ends: list[Array]
-    laws: list[OtherLaw]
     values: dict[str, Value]
     curved: list[int]
     profiled: dict[str, Profile]
@@ -50,12 +47,10 @@ class Surroundings:
 
 def surroundings(model: ForwardModel, outcome: Outcome, near: Evidence, profiles_too: bool) -> Surroundings:
     """Return what the surroundings of an outcome show of its parameters."""
-    point, at, found, beside, laws = near.point, near.at, outcome, list[Array](), list[OtherLaw]()
+    point, at, found, beside = near.point, near.at, outcome, list[Array]()
     if near.known:
         found, beside = unless_late(lambda: valley(model, outcome, at), (found, beside))
-        laws = unless_late(lambda: other_laws(model, point, near.seen), laws)
-    # Where there is a misfit, what it may be due to is in the intervals; else it is said.
-    ends = [point, *beside, *(law.end for law in laws if law.fits and near.tests.limited)]
+    ends = [point, *beside]
     values = intervals.possible(
         model, intervals.spanning([intervals.parameters(model, end, at, near.correction) for end in ends])
     )
@@ -66,9 +61,7 @@ def surroundings(model: ForwardModel, outcome: Outcome, near: Evidence, profiles
     if profiles_too and near.known:
         profiled = profiles(model, point, at, profiled)
     values |= {n: replace(values[n], identifiable=False) for n, p in profiled.items() if p.open}
-    return Surroundings(
-        found, ends, laws, values, curved, profiled, combinations(model, point, at) if near.known else []
-    )
+    return Surroundings(found, ends, values, curved, profiled, combinations(model, point, at) if near.known else [])
 
 
 def _curved(model: ForwardModel, outcome: Outcome, near: Evidence) -> list[int]:

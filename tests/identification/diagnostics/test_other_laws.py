@@ -121,7 +121,7 @@ def test_an_interval_goes_from_the_lowest_to_the_highest(others: list[tuple[str,
         return Value(centre, half / 2, centre - half, centre + half, True)
 
     there = {field: value(centre, half) for field, centre, half in others}
-    laws = [OtherLaw("c", "O", field, False, np.zeros(1)) for field in there]
+    laws = [OtherLaw("c", "O", field, np.zeros(1)) for field in there]
     found = wider_by_other_laws(laws, {"c": value(1.0, 0.1)}, lambda law: there[law.field])
     assert "".join(one.text for one in found).endswith(told)
     assert bool(found) == bool(told)

@@ -12,6 +12,7 @@ from shoal.identification import findings as kinds
 from shoal.identification.deadline import TimeIsUp
 from shoal.identification.diagnostics.hypotheses import SAMPLES, Hypothesis, ScoreTest
 from shoal.identification.diagnostics.minima.rivals import ALIAS, relation, rivals_of, rows_of, within
+from shoal.identification.diagnostics.other_laws import OtherLaw, other_laws
 from shoal.identification.diagnostics.residual_tests import ResidualTests, residual_tests
 from shoal.identification.diagnostics.stationarity import downhill, sentence
 from shoal.identification.diagnostics.suspects import FaultSearch, Suspect, suspects
@@ -44,6 +45,7 @@ class Judgement:
     refits: fits with what would explain a misfit that is not held against the model; the intervals hold them too
     better: a minimum that fits better, if the search for suspects met one: go on from there
     hypotheses: the tests of what was taken as known, the most significant first, then the other minima
+    laws: other laws beside each friction that is sought
     """
 
     findings: list[Finding] = field(default_factory=list)
@@ -51,6 +53,7 @@ class Judgement:
     refits: list[Refit] = field(default_factory=list)
     better: Descent | None = None
     hypotheses: list[Hypothesis] = field(default_factory=list)
+    laws: list[OtherLaw] = field(default_factory=list)
 
     @property
     def verdict(self) -> Verdict:
@@ -89,9 +92,10 @@ def judge(
     if seen_well:
         at_answer = outcome.point, seen.residual, seen.jacobian, tests.explained
         looked = suspects(model, *at_answer, test=test, misfit=misfitting)
-    judged = _by_findings(model, outcome, seen, at, tests, parameters, unknown, looked, misfitting)
+    laws = other_laws(model, outcome.point, seen, looked.effects)
+    judged = _by_findings(model, outcome, seen, at, tests, parameters, unknown, looked, laws, misfitting)
     hypotheses = [*looked.hypotheses, *rows_of(model, outcome, at)]
-    return replace(judged, suspects=looked.suspects, hypotheses=hypotheses)
+    return replace(judged, suspects=looked.suspects, hypotheses=hypotheses, laws=laws)
 
 
 def _by_findings(
@@ -103,6 +107,7 @@ def _by_findings(
     parameters: dict[str, Value],
     unknown: list[str],
     looked: FaultSearch,
+    laws: list[OtherLaw],
     misfitting: bool,
 ) -> Judgement:
     """Judge a minimum by what was found of the things taken as known."""
@@ -111,7 +116,7 @@ def _by_findings(
         met = kinds.BETTER_MINIMUM.found(reason, fitness=outcome.fitness, better=better.fitness)
         return Judgement([met], better=better)
     found = looked.suspects
-    moved = _moved(parameters, looked, tests.rows)
+    moved = _moved(parameters, looked, {law.name for law in laws}, tests.rows)
     # Samples that contradict the others refute nothing that was stated.
     decisive = bool(found) and found[0].kind not in SAMPLES and found[0].before >= _DECISIVE * found[0].after
     if tests.wrong_model or decisive or (misfitting and moved):
@@ -141,12 +146,13 @@ def _ambiguous(relations: set[str], count: int) -> Finding:
     return kinds.SEVERAL_MINIMA.found(text, advice, minima=count)
 
 
-def _moved(parameters: Mapping[str, Value], looked: FaultSearch, rows: int) -> list[str]:
+def _moved(parameters: Mapping[str, Value], looked: FaultSearch, laws: set[str], rows: int) -> list[str]:
     """Return what the best significant suspects, so many rows being measured, take out of its interval.
 
     Another reading of the data has no interval in common with the stated one: it moves all parameters.
+    laws: names of those beside a sought friction, which widen its interval
     """
-    stated = [s for s in looked.suspects if s.kind not in SAMPLES]
+    stated = [s for s in looked.suspects if s.kind not in SAMPLES and s.name not in laws]
     best = {(s.name, s.kind) for s in stated if s.significant and s.equals(looked.suspects[0], rows)}
     ends = [looked.refits[key].values() if key in looked.refits else {} for key in best]
     return [

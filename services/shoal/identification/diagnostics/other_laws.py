@@ -1,18 +1,20 @@
-"""What a sought friction rests on: that its joint resists by no other law. A little of one may not show in a recording.
+"""Friction laws left out beside a sought friction: how far each may move it, read from the table of hypotheses.
 
 The effects of viscous friction, quadratic drag and dry friction on a few swings are so alike that a law which was left
-out moves the sought number far beyond an interval that knows of none, and leaves hardly a misfit.
+out moves the sought number far beyond an interval that knows of none, and leaves hardly a misfit. Each law is a row of
+the table: where it is significant it is a suspect, and the intervals hold its refit instead of refuting the model.
+Where it is not, a finding says how far as much of it as the data allow would move the sought friction.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from shoal.findings import Finding
-from shoal.identification.diagnostics.suspects.candidate import FaultHypothesis, Together, size_of
+from shoal.identification.diagnostics.suspects.candidate import size_of
 from shoal.identification.diagnostics.suspects.of_machine import RESISTING, resisting
 from shoal.identification.findings import OTHER_LAW
 from shoal.identification.forward import ForwardModel
@@ -24,30 +26,35 @@ from shoal.scene.joints import Resisted
 from shoal.trajectory import Array
 
 _FAR = 2.0
-"""Times the interval: a friction that may be so much farther off with another law beside it is told."""
+"""Times the interval: a friction that may be so much farther off with another law beside it is reported."""
 _ALIKE = 1e-3
-"""Of a friction: nobody who knows it so well asks for more."""
+"""Of a friction: a smaller change is no matter of a friction law."""
 
 
 @dataclass(frozen=True)
 class OtherLaw:
-    """Another law by which the joint of a friction that is sought may resist, and how much of it the data allow.
+    """Another law by which the joint of a sought friction may resist.
 
     sought: the friction's name; field: one of RESISTING, sought nowhere and left out of the joint
-    fits: whether some of it fits better than none; end: the fit, to first order, with as much of it as may be, (p,)
+    end: the fit, to first order, with as much of it as the data allow, (parameters,)
     """
 
     sought: str
     joint: str
     field: str
-    fits: bool
     end: Array
 
+    @property
+    def name(self) -> str:
+        """Return the name of its row in the table."""
+        return f"{RESISTING[self.field]} of {self.joint}"
 
-def other_laws(model: ForwardModel, point: Array, seen: Sensitivity) -> list[OtherLaw]:
-    """Each friction that is sought, with each other law that its joint may have. Runs are not counted."""
-    taken = {*model.parameters.paths, *model.problem.ties}
-    asked, beside = list[tuple[str, str, str]](), dict[tuple[str, str], FaultHypothesis]()
+
+def other_laws(
+    model: ForwardModel, point: Array, seen: Sensitivity, effects: Mapping[tuple[str, str, int], Sequence[Array]]
+) -> list[OtherLaw]:
+    """Return the other laws of each sought friction, by the effects that were measured for the table of hypotheses."""
+    found = list[OtherLaw]()
     for name, path in zip(model.names, model.parameters.paths, strict=True):
         where, _, field = path.rpartition(".")
         joint_name = where.removeprefix("joints.")
@@ -55,18 +62,14 @@ def other_laws(model: ForwardModel, point: Array, seen: Sensitivity) -> list[Oth
         if field not in RESISTING or not isinstance(joint, Resisted):
             continue
         for other in RESISTING:
-            if f"{where}.{other}" not in taken and not getattr(joint, other):
-                asked.append((name, joint_name, other))
-                beside[joint_name, other] = resisting(joint_name, joint, other, size_of(model.scene))
-    if not beside:
-        return []
-    candidates = list(beside.values())
-    probes = [candidate.probes[0, 0] for candidate in candidates]
-    points = [np.append(point, candidate.vector(probe)) for candidate, probe in zip(candidates, probes, strict=True)]
-    effects = Together(model, candidates).residuals(range(len(candidates)), points) - seen.residual
-    most = [_most(model, point, seen, effect / probe[0]) for effect, probe in zip(effects, probes, strict=True)]
-    ends = dict(zip(beside, most, strict=True))
-    return [OtherLaw(name, joint, law, *end) for name, joint, law in asked if (end := ends[joint, law]) is not None]
+            law = resisting(joint_name, joint, other, size_of(model.scene))
+            measured = effects.get((law.name, law.kind, 1))
+            if measured is None or getattr(joint, other):
+                continue
+            end = _most(model, point, seen, measured[0][0] / law.probes[0, 0, 0])
+            if end is not None:
+                found.append(OtherLaw(name, joint_name, other, end))
+    return found
 
 
 def wider_by_other_laws(
@@ -95,9 +98,8 @@ def _whole(found: list[Value]) -> tuple[float, float]:
     return min(one.lower for one in found), max(one.upper for one in found)
 
 
-def _most(model: ForwardModel, point: Array, seen: Sensitivity, column: Array) -> tuple[bool, Array] | None:
-    """Return whether a law that was left out fits, and the fit with the most of it that may be; None where it has no
-    effect.
+def _most(model: ForwardModel, point: Array, seen: Sensitivity, column: Array) -> Array | None:
+    """Return the fit, to first order, with the most of a law that may be; None where it has no effect.
 
     column: its effect on the residuals, for each unit of it. The most is the upper end of its interval, or less where
     a parameter comes to its bound.
@@ -118,4 +120,4 @@ def _most(model: ForwardModel, point: Array, seen: Sensitivity, column: Array) -
     with np.errstate(divide="ignore", invalid="ignore"):
         room = np.where(slope < 0.0, model.lower - point, model.upper - point) / slope
     most = min([most, *room[slope != 0.0]])
-    return amount > 0.0, point + most * slope
+    return np.asarray(point + most * slope)

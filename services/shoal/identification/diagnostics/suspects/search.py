@@ -17,7 +17,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from shoal.identification.deadline import TimeIsUp
-from shoal.identification.diagnostics.hypotheses import SAMPLES, Hypothesis, ScoreTest, Suspect, penalty, table
+from shoal.identification.diagnostics.hypotheses import SAMPLES, Effects, Hypothesis, ScoreTest, Suspect, penalty, table
 from shoal.identification.diagnostics.suspects.candidate import FaultHypothesis, Together, groups_of
 from shoal.identification.diagnostics.suspects.of_bounds import at_bound, describe_bound, without_bounds
 from shoal.identification.diagnostics.suspects.of_machine import of_machine
@@ -69,7 +69,7 @@ class FaultSearch:
     """The suspects, those that explain most first, and by name and kind the fits of those that free numbers.
 
     better: a minimum of the model itself that fits better, if met; cut: whether time was up before all were tried
-    hypotheses: the score tests, the most significant first
+    hypotheses: the score tests, the most significant first; effects: by which they were scored
     """
 
     suspects: list[Suspect] = field(default_factory=list)
@@ -77,6 +77,7 @@ class FaultSearch:
     better: Descent | None = None
     cut: bool = False
     hypotheses: list[Hypothesis] = field(default_factory=list)
+    effects: Effects = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +126,7 @@ def suspects(
     listed = [suspect for suspect in found if suspect.cost(rows) <= _FAR**2 * found[0].cost(rows)]
     refits = {(s.name, s.kind): search.refits[s.name, s.kind] for s in listed if (s.name, s.kind) in search.refits}
     named = [replace(s, alike=search.alike(s.name)) for s in listed]
-    return FaultSearch(named, refits, search.better, cut, search.hypotheses)
+    return FaultSearch(named, refits, search.better, cut, search.hypotheses, search.measured)
 
 
 class _FaultSearch:
