@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shoal.errors import InputError
+from shoal.identification.conventions import NOTICED, SEVERAL
 from shoal.identification.deadline import TimeIsUp
 from shoal.identification.forward import ForwardModel, Progress
 from shoal.identification.methods import Method, Outcome
@@ -21,8 +22,6 @@ from shoal.trajectory import Array
 
 COARSER = 30.0
 """The search goes by a model whose error may be larger by this factor than that of the final one."""
-_OFF = 3.0
-"""A fit that leaves more than this many times the tolerance is not off by the model alone."""
 
 
 class Stopped(TimeIsUp):
@@ -62,7 +61,7 @@ def coarse_to_fine(
         descent = descend(fine, outcome.point, progress)
         point, fitness, rows = descent.point, descent.fitness, descent.rows
         # The coarse model may have led to the wrong minimum.
-        if np.sqrt(fitness) > _OFF * tolerance and not explained(fine, replace(outcome, fitness=fitness)):
+        if np.sqrt(fitness) > SEVERAL * tolerance and not explained(fine, replace(outcome, fitness=fitness)):
             again = search(fine, rng, progress)
             rows = rows + [(len(rows) + i, best, mean) for i, best, mean in again.iterations]
             point, fitness = min((point, fitness), (again.point, again.fitness), key=lambda end: end[1])
@@ -102,8 +101,6 @@ def _stage(selection: Selection, evaluations: int) -> AdaptedModel:
     return AdaptedModel(chosen.name, selection.tolerance, chosen.error, evaluations)
 
 
-_OF_NOISE = 0.1
-"""Of the noise: a smaller error of the step is not seen beside it, and its effect on the answer is in the intervals."""
 _HALVINGS = 6
 """At most."""
 _SETTLES = 2.0
@@ -132,7 +129,7 @@ def paced(model: ForwardModel, point: Array) -> ForwardModel:
             error = _between(seen, found) / model.rows.shown
             if error > before / _SETTLES:
                 return model
-            if error <= _OF_NOISE:
+            if error <= NOTICED:
                 return _stepping(model, 2 * step / 2**halvings) if halvings > 1 else model
             seen, before = found, error
     except InputError:

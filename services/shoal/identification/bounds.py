@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from shoal.errors import InputError
+from shoal.identification.conventions import PRECISION
 from shoal.scene import Scene
 
 _HALVINGS = 60
@@ -37,7 +38,7 @@ def possible_bound(
     for _ in range(_HALVINGS):
         middle = 0.5 * (inside + outside)
         inside, outside = (middle, outside) if accepts(scene, fields(middle)) else (inside, middle)
-    if abs(inside) < 1e-12 * abs(bound):
+    if abs(inside) < PRECISION * abs(bound):
         return None
     digit = 10.0 ** (np.floor(np.log10(abs(inside))) - 2)
     inwards = np.ceil if bound < inside else np.floor

@@ -13,6 +13,7 @@ import numpy as np
 from shoal.identification import findings as kinds
 from shoal.identification.adapt import AdaptedModel
 from shoal.identification.assemble import assemble
+from shoal.identification.conventions import DIFFERENCE
 from shoal.identification.deadline import unless_late
 from shoal.identification.diagnostics.judgement import Judgement, judge
 from shoal.identification.diagnostics.minima.turns import with_nearest_turns
@@ -27,8 +28,6 @@ from shoal.identification.methods.outcome import Outcome
 from shoal.identification.surroundings import Surroundings, surroundings
 from shoal.identification.uncertainty.profiles import Profile
 
-_LOWER = 1e-6
-"""Of the fitness: an answer that is better by more is another one."""
 _ROUNDS = 2
 """How often an answer moves on to a better minimum that was met."""
 
@@ -123,7 +122,7 @@ def _lower(model: ForwardModel, outcome: Outcome, profiled: dict[str, Profile]) 
     places = [found.place for found in profiled.values() if found.better]
     ends = descend_many(model, np.array(places)) if places else []
     best = min(ends, key=lambda end: end.fitness, default=None)
-    return best if best is not None and best.fitness < outcome.fitness * (1.0 - _LOWER) else None
+    return best if best is not None and best.fitness < outcome.fitness * (1.0 - DIFFERENCE) else None
 
 
 def _followed(outcome: Outcome, better: Descent) -> Outcome:

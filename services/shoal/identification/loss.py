@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from shoal.identification.conventions import PRECISION
 from shoal.trajectory import Array
 
 _TUNING = {"huber": 1.345, "soft-l1": 1.345, "cauchy": 2.385}
 """Of the noise, where a deviation begins to weigh less: 95 % efficiency for normal noise (Huber 1981; Zhang 1997)."""
-_SMALL = 1e-12
 
 
 def flatten(residuals: Array, loss: str, noise: Array) -> Array:
@@ -46,7 +46,7 @@ def steepness(flat: Array, loss: str, noise: Array) -> Array:
         case "soft-l1":
             found = np.sqrt((1.0 + rho / 2.0) / (1.0 + rho / 4.0))
         case "cauchy":
-            found = np.sqrt(np.maximum(rho, _SMALL) / -np.expm1(-np.maximum(rho, _SMALL)))
+            found = np.sqrt(np.maximum(rho, PRECISION) / -np.expm1(-np.maximum(rho, PRECISION)))
         case _:
             raise NotImplementedError(f"loss: {loss} has no steepness")
     steeper: Array = found

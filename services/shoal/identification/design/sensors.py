@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from shoal.errors import InputError
+from shoal.identification.conventions import DIFFERENCE
 from shoal.identification.design.asked import ANGLE
 from shoal.identification.design.precision import Bundle
 from shoal.identification.recording.source import ACCELERATIONS, FORCES, MOMENTS, RATES, Channel, Quantity
@@ -19,8 +20,6 @@ from shoal.scene.joints import Revolute
 
 _SAME = 1e-3
 """Two places whose sensitivities differ by less tell the same."""
-_NOTHING = 1e-6
-"""Of its noise: what the whole range of every parameter changes by less, such as a clamped place, is round-off."""
 _TILTS = 8
 """Directions of an accelerometer of one axis that are tried, over half a turn; the other half differs by the sign."""
 _DIRECTIONS = ((1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (1, -1, 0), (1, 0, 1), (1, 0, -1), (0, 1, 1), (0, 1, -1))
@@ -197,7 +196,7 @@ def columns_of(bundle: Bundle, sensors: list[Sensor]) -> dict[Sensor, list[int]]
         size = float(np.linalg.norm(mine))
         same = [k for k in found.values() if len(k) == len(own)]
         repeated = any(np.linalg.norm(bundle.table[:, k] * bundle.span - mine) < _SAME * size for k in same)
-        if size > _NOTHING and not repeated:
+        if size > DIFFERENCE and not repeated:
             found[sensor] = own
     if not found:
         raise InputError("parameters: no marker and no end of a body moves with any of them")

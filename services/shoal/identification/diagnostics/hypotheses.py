@@ -19,8 +19,9 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
+from shoal.identification.conventions import DIFFERENCE, DOUBT, ROUND_OFF
 from shoal.identification.forward import ForwardModel
-from shoal.identification.uncertainty.chances import above_f
+from shoal.identification.uncertainty.chances import above_f, chi_square_above
 from shoal.identification.uncertainty.covariance import Block, Noise, blocks_of, correlate, estimate_noise
 from shoal.identification.uncertainty.linearisation import followed
 from shoal.identification.uncertainty.uncertain_inputs import Given
@@ -31,15 +32,10 @@ Mask = npt.NDArray[np.bool_]
 SAMPLES = ("recording", "stretch")
 """Kinds of hypotheses that leave samples out: the data contradict each other, and not what is stated."""
 
-SIGNIFICANT = 5e-4
-"""P-value over all hypotheses below which the data contradict one: of 2000 right models one is rejected."""
 
 _MOST = 0.75
 """Of the mean square of a residual: a fit that lowers it by so much names what a misfit is mainly due to, although what
 remains is not noise."""
-
-_ZERO = 1e-9
-"""Of the largest eigenvalue of correlations: a smaller one counts as none."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +62,7 @@ class Hypothesis:
     @property
     def significant(self) -> bool:
         """Return whether the data contradict what was taken as known."""
-        return self.corrected < SIGNIFICANT
+        return self.corrected < DOUBT
 
     @property
     def explains(self) -> bool:
@@ -158,7 +154,7 @@ class ScoreTest:
         size = np.linalg.norm(effects, axis=1)
         scaled = self._own(effects / np.where(size > 0.0, size, 1.0)[:, None])
         left, singular, _ = np.linalg.svd(scaled.T, full_matrices=False)
-        own = left[:, singular > _UNSEEN].T
+        own = left[:, singular > DIFFERENCE].T
         if not len(own):
             return 0.0, 1.0, 0.0, np.zeros(effects.shape[1])
         first = self._test(own, self.noise)
@@ -217,8 +213,6 @@ def _part(block: Block, kept: Mask) -> Block:
 
 _AGAIN = 0.01
 """P-value from which down a noise is estimated again."""
-_UNSEEN = 1e-6
-"""Of an effect: what remains of one that the sought parameters follow wholly, to the accuracy of differences."""
 
 Effects = Mapping[tuple[str, str, int], Sequence[Array]]
 """By name, kind and how many numbers are freed: the effects (effects, rows) by each way to measure them."""
@@ -251,12 +245,8 @@ def table(
 def independent(units: Array) -> float:
     """How many independent tests those along unit effects (tests, rows) are worth (Li and Ji 2005)."""
     values = np.abs(np.linalg.eigvalsh(units @ units.T))
-    values = np.where(values < _ZERO * len(units), 0.0, values + _ZERO)
+    values = np.where(values < ROUND_OFF * len(units), 0.0, values + ROUND_OFF)
     return float(np.sum((values >= 1.0) + (values - np.floor(values))))
-
-
-_CHANCE = 10.83
-"""By how much one more parameter lowers a chi-square by chance once in a thousand times."""
 
 
 @dataclass(frozen=True)
@@ -285,7 +275,7 @@ class Suspect:
     @property
     def significant(self) -> bool:
         """Return whether the data contradict what was taken as known."""
-        return self.chance < SIGNIFICANT
+        return self.chance < DOUBT
 
     @property
     def words(self) -> str:
@@ -305,7 +295,7 @@ class Suspect:
         """Return whether so many rows do not distinguish it from the best one, which has no more numbers: alike within
         chance.
         """
-        alike = self.after**2 <= best.after**2 * max(1.0 + _CHANCE / rows, 1.02)
+        alike = self.after**2 <= best.after**2 * max(1.0 + chi_square_above(1.0, DOUBT) / rows, 1.02)
         return alike and self.numbers <= best.numbers
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from shoal.findings import Finding
 from shoal.identification import findings as kinds
+from shoal.identification.conventions import OUTLIER
 from shoal.identification.deadline import TimeIsUp
 from shoal.identification.diagnostics.hypotheses import SAMPLES, Hypothesis, ScoreTest
 from shoal.identification.diagnostics.minima.rivals import ALIAS, relation, rivals_of, rows_of, within
@@ -31,8 +32,6 @@ _DECISIVE = 5.0
 """What lowers even a small misfit by this factor refutes what was stated, though intervals that hold it were wide."""
 _NEGLIGIBLE = 1e-4
 """Of the signal: a misfit below it is not looked into."""
-_FAR_OFF = 5.0
-"""Standard deviations of a prior, from where on the data contradict it."""
 _OTHERS = 3
 """Suspects that explain less than the best, and are named beside it."""
 
@@ -257,7 +256,7 @@ def _against_priors(model: ForwardModel, residual: Array) -> list[tuple[str, flo
     """Parameters whose priors the data contradict, and by how many standard deviations, the farthest last."""
     off = np.abs(residual[len(model.rows.time) :]) / (model.rows.noise or 1.0)
     named = [(model.names[k], float(far)) for (k, _), far in zip(model.parameters.priors, off, strict=True)]
-    return sorted((one for one in named if one[1] > _FAR_OFF), key=lambda one: one[1])
+    return sorted((one for one in named if one[1] > OUTLIER), key=lambda one: one[1])
 
 
 def _against(tests: ResidualTests) -> str:

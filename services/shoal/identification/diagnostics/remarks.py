@@ -6,17 +6,11 @@ from collections.abc import Mapping
 
 from shoal.findings import Finding
 from shoal.identification import findings as kinds
+from shoal.identification.conventions import NOTICED, SEVERAL
 from shoal.identification.diagnostics.residual_tests import ResidualTests
 from shoal.identification.uncertainty.intervals import Value
 from shoal.identification.uncertainty.profiles import Profile
 from shoal.mechanics.findings import SMALLER
-
-_NOTICED = 0.1
-"""Of half an interval: a contribution to it that is worth a word."""
-_WIDE = 3.0
-"""Standard deviations on each side: an interval that is wider holds more than noise."""
-_ALIKE = 3.0
-"""A residual within this factor of the mesh error is explained by it."""
 
 
 def remarks(
@@ -65,7 +59,7 @@ def beyond_noise(
     parameters: Mapping[str, Value], profiled: Mapping[str, Profile], tests: ResidualTests
 ) -> list[Finding]:
     """Return which intervals hold much more than the standard deviations, and what, if any does."""
-    wide = [n for n, v in parameters.items() if v.identifiable and v.upper - v.lower > _WIDE * 2 * v.std > 0.0]
+    wide = [n for n, v in parameters.items() if v.identifiable and v.upper - v.lower > SEVERAL * 2 * v.std > 0.0]
     parts = {part for name in wide for part in ("correction", "theory") if getattr(parameters[name], part)}
     found = ["the model's own error"] * bool(parts) + ["the systematic residual"] * (tests.excess > 0.0)
     found += ["the curvature of the misfit"] * any(name in profiled for name in wide)
@@ -78,11 +72,11 @@ def beyond_noise(
 def _limited(parameters: Mapping[str, Value], part: str) -> str:
     """Whose intervals a part of the model's error widens, `correction` or `theory`."""
     parts = {name: abs(getattr(value, part) or 0.0) for name, value in parameters.items()}
-    return ", ".join(n for n, v in parameters.items() if parts[n] > _NOTICED * (v.upper - v.lower) / 2)
+    return ", ".join(n for n, v in parameters.items() if parts[n] > NOTICED * (v.upper - v.lower) / 2)
 
 
 def _excess(tests: ResidualTests, mesh: float) -> str:
     """Against what the mesh, and not the measurement, limits the answer; empty if it does not."""
     if tests.noise_stated:
         return f"exceeds the noise of {tests.sized(tests.noise)}" if mesh > tests.noise else ""
-    return "is all that the fit leaves" if mesh / _ALIKE < tests.size < mesh * _ALIKE else ""
+    return "is all that the fit leaves" if mesh / SEVERAL < tests.size < mesh * SEVERAL else ""

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from shoal.identification.conventions import DOUBT, GROSS, HARDLY, MAD, MOSTLY, OUTLIER, PRECISION, ROUND_OFF, SEVERAL
 from shoal.identification.forward import ForwardModel
-from shoal.identification.methods.outcome import GROSS, NOISES
 from shoal.identification.recording.units import of_channels
 from shoal.identification.uncertainty.chances import above_chi_square
-from shoal.identification.uncertainty.covariance import DOUBT, Block, Noise
+from shoal.identification.uncertainty.covariance import Block, Noise
 from shoal.json_values import plain
 from shoal.trajectory import Array
 
@@ -20,28 +20,12 @@ _LOUD = 1.5
 """Times the stated noise: a white residual up to here is a noise that was stated too small, a larger one is not."""
 _SURE = 1e-6
 """Chance below which an estimated noise counts as exceeded; models are looked at for many reasons, so it is small."""
-_HARDLY = 0.3
-"""Of the signal: a residual above this that is not white is none of a right model, whatever the noise may be."""
-_TABLE_DIGITS = 1e-9
-"""Of the signal: digits of a table, and no noise."""
-_MOSTLY = 0.5
-"""Of the signal: a residual above this may be noise, but nobody said so."""
-_SEVERAL = 3.0
-"""Times the residual: a noise that the data show beyond this is motion; no noise makes fourth differences so large."""
-_UNRESOLVED = 0.05
-"""Of the signal: motion that its fourth differences show as a noise above this has less than eight samples a period."""
 _LAGS = 16
 """Order of the linear prediction, at most a fifth of the samples: two coefficients for each of eight spectral lines."""
 _FAR = 3
 """Samples later they do: noise is alike so far apart by no differences, such as those that make a rate of angles."""
-OUTLIER = 5.0
-"""Robust standard deviations: of normal noise one sample in two million is farther off."""
 _FEW = 0.1
 """Of the samples: so many outliers a robust loss may set aside."""
-_DIGITS = 1e-12
-"""Of the data: no deviation below is held against a model, as a motion is computed to this tolerance by default."""
-MAD = 1.4826
-"""Standard deviation over the median absolute deviation of a normal distribution."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +97,7 @@ class ResidualTests:
         """Return whether the residual is more than noise: larger than stated, and not white; or much larger."""
         if self.noise_stated:
             return self.too_large and (not self.white or self.ratio > _LOUD)
-        return self.ratio > NOISES and self.chance_of_size < _SURE
+        return self.ratio > SEVERAL and self.chance_of_size < _SURE
 
     @property
     def limited(self) -> bool:
@@ -125,7 +109,7 @@ class ResidualTests:
         """Return whether a constant would fit as well, or hardly worse where nobody said that the noise is so large."""
         if self.noise_stated:
             return self.too_large and self.size >= self.signal > 0.0
-        return self.size >= _MOSTLY * self.signal > 0.0
+        return self.size >= MOSTLY * self.signal > 0.0
 
     @property
     def wrong_model(self) -> bool:
@@ -134,7 +118,7 @@ class ResidualTests:
         """
         if self.noise_stated:
             return self.systematic or self.explains_nothing
-        hardly = not self.white and (self.ratio > 1.0 or self.unresolved) and self.size > _HARDLY * self.signal
+        hardly = not self.white and (self.ratio > 1.0 or self.unresolved) and self.size > HARDLY * self.signal
         return hardly or self.explains_nothing or (self.systematic and self.size > GROSS * self.signal)
 
     def sized(self, size: float) -> str:
@@ -160,7 +144,7 @@ class ResidualTests:
     @property
     def correlation(self) -> str:
         """What the residuals' correlation shows, in words."""
-        if self.size < _TABLE_DIGITS * self.signal:
+        if self.size < ROUND_OFF * self.signal:
             return "that of round-off"
         if not self.white:
             return "not white noise"
@@ -201,8 +185,8 @@ def residual_tests(
     size, smaller = (float(np.sqrt(np.sum(r[rows] ** 2) / np.sum(counted[rows]))) for r in (counted * residual, left))
     seen = model.rows.noise if model.rows.noise is not None else _without_model(model)
     known = float(np.sqrt(max(0.0, mesh**2 - chosen**2)))
-    motion = model.rows.noise is None and seen > _SEVERAL * size
-    unresolved = motion and seen > _UNRESOLVED * model.rows.signal
+    motion = model.rows.noise is None and seen > SEVERAL * size
+    unresolved = motion and seen > GROSS * model.rows.signal
     seen = size if unresolved else seen
     # Chi-square with as many samples as the residual's memory leaves independent for its variance (Bartlett 1935),
     # less the parameters.
@@ -276,7 +260,7 @@ def _without_model(model: ForwardModel) -> float:
     """The noise that the data show, and at least what is beyond the digits of the solver."""
     rows = model.rows
     largest = [np.max(np.abs(np.nan_to_num(r.values)), axis=0) for r in model.measurement.recordings.values()]
-    digits = np.array([_DIGITS * largest[r][c] for r, c in zip(rows.recording, rows.channel, strict=True)])
+    digits = np.array([PRECISION * largest[r][c] for r, c in zip(rows.recording, rows.channel, strict=True)])
     return float(np.sqrt(np.mean((np.maximum(rows.estimated, digits) * rows.weight) ** 2)))
 
 

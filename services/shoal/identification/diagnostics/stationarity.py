@@ -11,22 +11,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from shoal.identification.conventions import DIFFERENCE, LEVEL, PRECISION
 from shoal.identification.forward import ForwardModel
+from shoal.identification.uncertainty.chances import chi_square_above
 from shoal.identification.uncertainty.covariance import blocks_of
 from shoal.identification.uncertainty.linearisation import determined, linearise
 from shoal.identification.uncertainty.sensitivity import Sensitivity
 from shoal.trajectory import Array
 
-_FAR = 2.0
-"""Standard deviations, of that combination of the parameters which is furthest away: a 95 % interval."""
 _PARTS = 2.0 ** np.arange(2, -8, -1)
 """Of the step: where the model is not linear, the whole may lead too far, and with a robust loss not far enough."""
 _KEPT = 0.1
 """Of the gain that the linear model promises, what has to come true."""
-_NOTHING = 1e-6
-"""Of the spread of the data: no step that changes the motion by less is held against an answer."""
-_DIGITS = 1e-12
-"""Of the largest number in the data: what a machine at rest, whose data do not spread, leaves of its motion."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +46,7 @@ def downhill(model: ForwardModel, point: Array, seen: Sensitivity) -> Downhill |
     """
     step = _step(model, point, seen)
     largest = max(float(np.nanmax(np.abs(r.values))) for r in model.measurement.recordings.values())
-    nothing = max(_NOTHING * model.rows.signal, _DIGITS * largest * float(np.max(model.rows.weight)))
+    nothing = max(DIFFERENCE * model.rows.signal, PRECISION * largest * float(np.max(model.rows.weight)))
     if np.sqrt(np.mean((seen.jacobian @ step) ** 2)) < nothing:
         return None
     low, high = model.box_at(point)
@@ -60,7 +56,7 @@ def downhill(model: ForwardModel, point: Array, seen: Sensitivity) -> Downhill |
     best = int(np.argmin(after))
     promised = before - float(model.cost((seen.residual + seen.jacobian @ (places[best] - point))[None])[0])
     distance = _distance(model, point, places[best], seen, rows[1 + best])
-    if distance < _FAR or before - after[best] < _KEPT * promised:
+    if distance < np.sqrt(chi_square_above(1.0, 1.0 - LEVEL)) or before - after[best] < _KEPT * promised:
         return None
     return Downhill(places[best], after[best], before, distance)
 

@@ -9,12 +9,13 @@ import numpy as np
 import numpy.typing as npt
 
 from shoal.errors import InputError
+from shoal.identification.conventions import GROSS, SEVERAL
 from shoal.identification.forward import ForwardModel, Progress
 from shoal.identification.methods.growth import FRACTAL, LARGE, growth, swings
 from shoal.identification.methods.lanes import Descent, descend_many, differentiate_many, differing, distinct
 from shoal.identification.methods.least_squares import PATIENCE, differentiate, from_starts
 from shoal.identification.methods.multiple_shooting import multiple_shooting
-from shoal.identification.methods.outcome import GROSS, NOISES, Outcome
+from shoal.identification.methods.outcome import Outcome
 from shoal.identification.methods.progressive import extend
 from shoal.identification.methods.starts import scatter, starting_points
 from shoal.identification.recording.units import of_channels
@@ -152,9 +153,9 @@ def explained(model: ForwardModel, outcome: Outcome) -> bool:
     rows = len(model.rows.time)
     left = np.sqrt(outcome.fitness * model.rows.samples / rows)
     if model.rows.noise is not None:
-        return bool(left <= NOISES * model.rows.noise)
+        return bool(left <= SEVERAL * model.rows.noise)
     noise = float(np.max(np.nan_to_num(model.rows.estimated * model.rows.weight)))
-    return bool(left <= max(GROSS * model.rows.signal, NOISES * noise))
+    return bool(left <= max(GROSS * model.rows.signal, SEVERAL * noise))
 
 
 def false_minima(model: ForwardModel, point: Array) -> list[Descent]:

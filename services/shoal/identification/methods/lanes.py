@@ -14,6 +14,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from shoal.identification.conventions import DIFFERENCE, ROUND_OFF
 from shoal.identification.forward import ForwardModel, Progress
 from shoal.mechanics.integrators import facts
 from shoal.mechanics.numerics.tile import WIDE
@@ -21,13 +22,9 @@ from shoal.trajectory import Array
 
 T = TypeVar("T")
 
-DIFFERENCE = 1e-6
-"""Step of the finite differences, relative to the size of a parameter (at least 1e-3 of its range)."""
 _ITERATIONS = 60
 _ROUNDS = 5
 """Of so many iterations, at most, where a descent that has not converged is followed to its end."""
-_SMALL_STEP = 1e-9
-"""Relative to the size of a parameter; a smaller step is the end."""
 _SMALL_GAIN = 1e-8
 """A step that promises to lower the fitness by less than this fraction is the end."""
 UNDAMPED, _LARGE_DAMPING = 1e-6, 1e12
@@ -266,7 +263,7 @@ class Search:
             if not cut or self.stuck:
                 break
             self.damping = max(10 * self.damping, 1e-3)
-        small = np.max(np.abs(moved) / model.sizes(self.point)) < _SMALL_STEP
+        small = np.max(np.abs(moved) / model.sizes(self.point)) < ROUND_OFF
         self.converged = bool(small or self.predicted < _SMALL_GAIN * self.cost)
         return None if self.converged else trial
 
@@ -359,10 +356,6 @@ def differing(model: ForwardModel, one: Array, other: Array) -> Array:
     return np.asarray(np.where(turning, turned, difference) > ENDS_APART * scale)
 
 
-_ALIKE = 1e-9
-"""Of a rotation vector [rad]: what turns may change of its components that are not sought."""
-
-
 def nearest_attitudes(model: ForwardModel, point: Array, other: Array) -> Array:
     """A point (parameters,) with its rotation vectors, of those of the same attitudes, nearest to those of another."""
     found = point.copy()
@@ -376,6 +369,6 @@ def nearest_attitudes(model: ForwardModel, point: Array, other: Array) -> Array:
         angle = float(np.linalg.norm(vector))
         turns = np.round((vector @ near / angle - angle) / (2 * np.pi)) if angle > 0.0 else 0.0
         turned = vector * (1.0 + 2 * np.pi * turns / angle) if turns else vector
-        if np.all(np.abs(np.delete(turned - vector, sought)) <= _ALIKE):
+        if np.all(np.abs(np.delete(turned - vector, sought)) <= ROUND_OFF):
             found[numbers] = turned[sought]
     return found

@@ -18,7 +18,7 @@ from shoal.identification.forward import ForwardModel, Progress
 from shoal.identification.methods.lanes import differentiate_many
 from shoal.identification.methods.least_squares import descend
 from shoal.identification.methods.outcome import Outcome
-from shoal.identification.methods.progressive import progressive
+from shoal.identification.methods.progressive import TRUST, progressive
 from shoal.identification.methods.starts import starting_points
 from shoal.identification.problem import Parameter
 from shoal.identification.recording.measurement import Recording
@@ -35,8 +35,6 @@ _SAMPLES = 5
 _ITERATIONS = 15
 _MEETING = 1e-5
 """Where no unknown moves more [rad, rad/s, fractions of a range], single shooting takes over."""
-_TRUST = 0.3
-"""Standard deviation of a step as a fraction of a parameter's range, against the deviation that the fit has."""
 _FASTEST = 1e3
 """Bound of the rates at the begins of segments [rad/s]."""
 _PREFIX = "state-"
@@ -158,7 +156,7 @@ class Segments:
             rows.append(block)
             right.append(-small[:, -1])
             squares, numbers = squares + float(np.sum((weight * off) ** 2)), numbers + len(off)
-        trust = np.sqrt(squares / numbers) / _TRUST / np.concatenate([np.ones(count * width), self._span])
+        trust = np.sqrt(squares / numbers) / TRUST / np.concatenate([np.ones(count * width), self._span])
         equations, wanted = self._equations(states, seen, jacobian, columns, shared)
         matrix, vector = np.concatenate([*rows, np.diag(trust)]), np.concatenate([*right, np.zeros(size)])
         from scipy.linalg.lapack import dgglse  # slow to import

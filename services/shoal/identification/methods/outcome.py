@@ -12,11 +12,6 @@ from shoal.identification.forward import ForwardModel, Progress
 from shoal.identification.methods.lanes import Descent, differing, distinct, history
 from shoal.trajectory import Array
 
-GROSS = 0.05
-"""Of the spread of the data: what leaves more is no fit, though nobody knows the noise."""
-NOISES = 3.0
-"""Times the noise: so much a fit may leave while the noise is only estimated, or the method not yet at its end."""
-
 
 @dataclass(frozen=True)
 class Outcome:

@@ -35,7 +35,7 @@ _GAIN = 1e-3
 """A step that promises to lower the squares by less than this fraction ends a horizon."""
 _HOPELESS = 25.0
 """Times the fitness of the best branch on the same horizon: a branch that is worse is dropped."""
-_TRUST = 0.3
+TRUST = 0.3
 """Of its range: standard deviation of a parameter around the answer of the horizon before."""
 
 
@@ -88,7 +88,7 @@ def fit(model: ForwardModel, start: Array) -> Branch:
         cost = squares(residual)
         if not np.isfinite(cost):
             break
-        trust = np.sqrt(cost / len(residual)) / _TRUST / span
+        trust = np.sqrt(cost / len(residual)) / TRUST / span
         scale = np.sqrt(np.sum(jacobian**2, axis=0) + trust**2)
         normal = jacobian.T @ jacobian + np.diag(trust**2 + damping * scale**2)
         gradient = jacobian.T @ residual + trust**2 * (point - start)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from shoal.identification.conventions import ROUND_OFF
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods.lanes import kept_apart
 from shoal.mechanics.numerics.levenberg_marquardt import levenberg_marquardt
@@ -19,7 +20,7 @@ _CANDIDATES = 16
 _MOST = 8
 """Starting points, at most."""
 _ITERATIONS = 30
-_GAIN, _ROUND_OFF = 1e-3, 1e-9
+_GAIN = 1e-3
 """Poses are found where a step promises to lower the squared error by less than this part; an error below this [m] that
 does not halve is round-off."""
 _FIRST_SAMPLES = 5
@@ -108,7 +109,7 @@ def _poses(model: ForwardModel, name: str, middle: Array, angles: list[int], pos
         return _pose_error(model, name, placed, angles, pose)
 
     found = levenberg_marquardt(
-        evaluate, damped_steps, points[:, angles], gain=_GAIN, round_off=_ROUND_OFF, most=_ITERATIONS,
+        evaluate, damped_steps, points[:, angles], gain=_GAIN, round_off=ROUND_OFF, most=_ITERATIONS,
         move=lambda at, step: np.clip(at + step, model.lower[angles], model.upper[angles]),
     )  # fmt: skip
     points[:, angles] = found.points

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from shoal.errors import InputError
+from shoal.identification.conventions import MAD, PRECISION
 from shoal.identification.recording.source import Channel, Clocked
 from shoal.trajectory import Array
 
@@ -143,8 +144,6 @@ class Measurement:
 
 
 _ORDER = 4
-_QUARTILE = 0.6744897501960817
-"""Median absolute deviation of a normal distribution over its standard deviation."""
 
 
 def noise_of(recording: Recording) -> Array:
@@ -167,6 +166,6 @@ def differences(signal: Array) -> float:
         return float("nan")
     jumps = np.diff(known, _ORDER)
     # Of white noise of variance one: the sum of the squared binomial coefficients 1 4 6 4 1.
-    size = float(np.median(np.abs(jumps)) / _QUARTILE / np.sqrt(70.0))
+    size = float(np.median(np.abs(jumps)) * MAD / np.sqrt(70.0))
     digit = float(np.diff(np.unique(known)).min(initial=np.inf)) if np.ptp(known) else 0.0
-    return max(size, digit / float(np.sqrt(12.0)), 1e-12 * float(np.ptp(known)), 1e-300)
+    return max(size, digit / float(np.sqrt(12.0)), PRECISION * float(np.ptp(known)), 1e-300)

@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shoal.errors import InputError
+from shoal.identification.conventions import ROUND_OFF
 from shoal.identification.recording.measurement import FEWEST, Measurement, Recording
 from shoal.identification.recording.source import Channel, FileSource
 from shoal.scene import Scene
@@ -31,8 +32,6 @@ _FARTHER = 10.0
 """Times the machine's size to either side."""
 _PARTS = 50.0
 """Of the shortest period: rates are taken over that time, so that noise does not count."""
-_STILL = 1e-9
-"""Of a channel's size: what moves less does not move."""
 _UPRIGHT = 1e-3
 """Of gravity: across the axis of a hinge, less swings nothing."""
 _LENGTHS = {"cm": 100.0, "mm": 1000.0, "um": 1e6}
@@ -125,14 +124,14 @@ def check_constant(measurement: Measurement, simulated: Callable[[str], Array]) 
         return
     for name, recording in measurement.recordings.items():
         seen_often = np.isfinite(recording.values).sum(axis=0) >= FEWEST
-        still = [k for k in np.flatnonzero(seen_often) if _spread(recording.values[:, k]) <= _STILL]
+        still = [k for k in np.flatnonzero(seen_often) if _spread(recording.values[:, k]) <= ROUND_OFF]
         # A machine that rests shows in all channels; that a single one stands still tells no rest.
         if not still or 1 < len(still) == len(seen_often):
             continue
         seen = simulated(name)
         for k in still:
             channel, moved = recording.channels[k], np.ptp(seen[:, k]) if np.all(np.isfinite(seen[:, k])) else 0.0
-            if moved > _STILL * max(1.0, float(np.max(np.abs(seen[:, k])))):
+            if moved > ROUND_OFF * max(1.0, float(np.max(np.abs(seen[:, k])))):
                 what = f"column {channel.column!r}" if channel.column else f"{channel.place} {channel.quantity}"
                 value = float(np.nanmean(recording.values[:, k]))
                 raise InputError(
@@ -145,7 +144,7 @@ def _pace(times: Array, signal: Array) -> float | None:
     """The period [s] of a harmonic signal of the same size and speed; None without a motion."""
     known = np.isfinite(signal)
     t, x = times[known], signal[known]
-    if len(t) < 3 or _spread(x) <= _STILL:
+    if len(t) < 3 or _spread(x) <= ROUND_OFF:
         return None
     speed = float(np.sqrt(np.mean((np.diff(x) / np.diff(t)) ** 2)))
     return 2 * math.pi * float(np.std(x)) / speed

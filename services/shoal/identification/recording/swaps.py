@@ -7,6 +7,7 @@ from itertools import combinations
 
 import numpy as np
 
+from shoal.identification.conventions import PRECISION
 from shoal.trajectory import Array
 
 _PENALTY = 4.0
@@ -44,7 +45,7 @@ def _exchanged_samples(times: Array, one: Array, other: Array) -> Array:
     if len(known) < 4:
         return wrong
     costs = _prediction_errors(times[known], one[known], other[known])
-    penalty = max(_PENALTY * float(np.quantile(costs.min(axis=(0, 1)), 0.99)), 1e-12 * float(np.ptp(one[known])))
+    penalty = max(_PENALTY * float(np.quantile(costs.min(axis=(0, 1)), 0.99)), PRECISION * float(np.ptp(one[known])))
     if costs[0, 0].max() <= penalty:
         return wrong
     state = np.cumsum(_cheapest(costs, penalty)) % 2 == 1

@@ -12,14 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from shoal.identification.conventions import DOUBT
 from shoal.identification.forward import ForwardModel
 from shoal.identification.uncertainty.chances import above_chi_square
 from shoal.trajectory import Array
 
 _ROUNDS = 60
 _SETTLED = 1e-5
-DOUBT = 1e-3
-"""P-value below which a test against a stated noise, or of whiteness, fails: one right model in 500 does."""
 _LONGEST = 1.0 / 3.0
 """Correlation that outlasts this part of a recording cannot be distinguished from a change of the parameters."""
 

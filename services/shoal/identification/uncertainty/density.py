@@ -10,10 +10,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from shoal.identification.conventions import LEVEL
 from shoal.identification.forward import ForwardModel
 from shoal.identification.uncertainty.chances import student_above
 from shoal.identification.uncertainty.covariance import Block
-from shoal.identification.uncertainty.linearisation import ABSORBED, LEVEL, Linearisation
+from shoal.identification.uncertainty.linearisation import ABSORBED, Linearisation
 from shoal.trajectory import Array
 
 

@@ -7,11 +7,12 @@ from functools import cached_property
 
 import numpy as np
 
+from shoal.identification.conventions import DIFFERENCE, LEVEL
 from shoal.identification.forward import ForwardModel
 from shoal.identification.problem import RESERVED
 from shoal.identification.recording.units import unit
 from shoal.identification.uncertainty.covariance import blocks_of
-from shoal.identification.uncertainty.linearisation import LEVEL, Linearisation, Spread, linearise, spread
+from shoal.identification.uncertainty.linearisation import Linearisation, Spread, linearise, spread
 from shoal.identification.uncertainty.model_error import Corrections
 from shoal.scene import expression
 from shoal.trajectory import Array
@@ -65,7 +66,7 @@ def parameters(model: ForwardModel, point: Array, at: Linearisation, correction:
     for k, name in enumerate(model.names):
         about = spread(lambda p, k=k: float(p[k]), point, at)  # type: ignore[misc]
         span = model.upper[k] - model.lower[k]
-        at_bound = bool(min(point[k] - model.lower[k], model.upper[k] - point[k]) < 1e-6 * span)
+        at_bound = bool(min(point[k] - model.lower[k], model.upper[k] - point[k]) < DIFFERENCE * span)
         shift = correction.of(lambda p, k=k: float(p[k]), point)  # type: ignore[misc]
         determined = about.fixed and not at_bound and about.std < span and not few(model)
         known = _value(float(point[k]), about, determined, shift, at_bound)

@@ -8,18 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from shoal.identification.conventions import DIFFERENCE, HIDDEN, LEVEL, PRECISION
 from shoal.identification.uncertainty.chances import student_above
 from shoal.identification.uncertainty.covariance import Block, Noise, correlate, estimate_noise
 from shoal.trajectory import Array
 
-_RANK = 1e-12
-"""Of the largest singular value: a smaller one is round-off, whatever the derivatives say."""
-_UNTRIED = 1e-6
-"""Likewise of derivatives by a single step, whose error is not known."""
 _FOLLOWED = 1e-8
 """Likewise of directions that a test takes for followed."""
-LEVEL = 0.95
-"""Of the intervals."""
 ABSORBED = 4.0
 """Times the part of a model's error that is left in the residual: the part that the parameters have followed."""
 
@@ -74,8 +69,8 @@ def determined(singular: Array, right: Array, error: Array | None) -> npt.NDArra
     """
     largest = np.max(singular, initial=0.0)
     if error is None:
-        return np.asarray(singular > _UNTRIED * largest)
-    return np.asarray(singular > np.maximum(np.linalg.norm(error @ right.T, axis=0), _RANK * largest))
+        return np.asarray(singular > DIFFERENCE * largest)
+    return np.asarray(singular > np.maximum(np.linalg.norm(error @ right.T, axis=0), PRECISION * largest))
 
 
 def inverse(jacobian: Array, scale: Array, error: Array | None = None) -> tuple[Array, Array, Array]:
@@ -120,11 +115,11 @@ def linearise(
 
 def spread(function: Callable[[Array], float], point: Array, at: Linearisation) -> Spread:
     """Uncertainty of a function of the parameters."""
-    steps = 1e-6 * at.scale
+    steps = DIFFERENCE * at.scale
     gradient = np.array([(function(point + step) - function(point - step)) for step in np.diag(steps)]) / (2 * steps)
     scaled = gradient * at.scale
     hidden = np.linalg.norm(scaled @ at.unknown) if at.unknown.size else 0.0
-    fixed = bool(hidden <= 1e-3 * max(float(np.linalg.norm(scaled)), 1e-300))
+    fixed = bool(hidden <= HIDDEN * max(float(np.linalg.norm(scaled)), 1e-300))
     shares = np.maximum(np.einsum("i,bij,j->b", gradient, at.parts, gradient), 0.0)
     std = float(np.sqrt(np.sum(shares)))
     lever = float(np.linalg.norm(gradient @ at.pseudo_inverse))

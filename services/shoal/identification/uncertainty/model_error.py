@@ -11,6 +11,7 @@ from shoal.engines.gauss import GaussEngine
 from shoal.engines.theory import WITH_SHEAR
 from shoal.engines.ways import CLOSE
 from shoal.errors import InputError
+from shoal.identification.conventions import NOTICED
 from shoal.identification.forward import ForwardModel
 from shoal.mechanics.integrators import facts
 from shoal.mechanics.simulate import stable_step
@@ -21,8 +22,6 @@ from shoal.trajectory import Array
 
 _STABLE = 0.9
 """Of the stable step at the start: it varies by a few percent along the motion."""
-_MATTERS = 0.1
-"""Of the mesh error and of what noise leaves uncertain: a theory error from here on is computed, not just estimated."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +78,7 @@ def model_error(model: ForwardModel, point: Array, predicted: Mapping[str, Array
         return ModelError(mesh, None)
     theory = _softened(model, point, predicted, slender)
     uncertain = rms_of(residual) / np.sqrt(len(residual))
-    matters = theory is None or rms_of(theory) > _MATTERS * max(uncertain, 0.0 if mesh is None else rms_of(mesh))
+    matters = theory is None or rms_of(theory) > NOTICED * max(uncertain, 0.0 if mesh is None else rms_of(mesh))
     if finer is not None and mesh is not None and matters:
         sheared = _sheared(model, point, predicted)
         theory = theory if sheared is None else sheared - mesh

@@ -19,13 +19,14 @@ from shoal.compile import clock
 from shoal.errors import InputError
 from shoal.findings import Finding
 from shoal.identification import findings as kinds
+from shoal.identification.conventions import LEVEL
 from shoal.identification.deadline import TimeIsUp
 from shoal.identification.forward import ForwardModel
 from shoal.identification.uncertainty.chains import ENSEMBLES, Independent, possible, sampler, weights
 from shoal.identification.uncertainty.covariance import Block
 from shoal.identification.uncertainty.density import Density, density
 from shoal.identification.uncertainty.intervals import Value
-from shoal.identification.uncertainty.linearisation import LEVEL, Linearisation
+from shoal.identification.uncertainty.linearisation import Linearisation
 from shoal.json_values import plain
 from shoal.trajectory import Array
 

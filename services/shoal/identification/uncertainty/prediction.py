@@ -17,11 +17,12 @@ import numpy.typing as npt
 
 from shoal.findings import Finding
 from shoal.identification import findings as kinds
+from shoal.identification.conventions import HIDDEN, LEVEL
 from shoal.identification.forward import ForwardModel
 from shoal.identification.recording.measurement import HeldOut
 from shoal.identification.recording.units import of_channel
 from shoal.identification.uncertainty.covariance import Block, Noise
-from shoal.identification.uncertainty.linearisation import LEVEL, Linearisation
+from shoal.identification.uncertainty.linearisation import Linearisation
 from shoal.identification.uncertainty.model_error import ModelError, model_error
 from shoal.identification.uncertainty.prediction_error import Fit, allowance, block_of, stated, unevenness
 from shoal.identification.uncertainty.sensitivity import AGREED, Sensitivity, sensitivity
@@ -34,8 +35,6 @@ Mask = npt.NDArray[np.bool_]
 _REFUTES = 1e-4
 """Chance by Satterthwaite's approximation, whose tail is up to several times too thin: a right model is refuted by its
 windows, all of them together, less than once in a thousand times."""
-_HIDDEN = 1e-3
-"""Share of a derivative along directions that the data leave open, from which on a prediction is not known."""
 
 
 @dataclass(frozen=True)
@@ -221,7 +220,7 @@ def _hidden(slopes: Array, at: Linearisation) -> bool:
     """Return whether a prediction moves along directions that the data leave open; slopes: of scaled parameters."""
     if not at.unknown.size:
         return False
-    return bool(np.linalg.norm(slopes @ at.unknown) > _HIDDEN * max(float(np.linalg.norm(slopes)), 1e-300))
+    return bool(np.linalg.norm(slopes @ at.unknown) > HIDDEN * max(float(np.linalg.norm(slopes)), 1e-300))
 
 
 def _bias(

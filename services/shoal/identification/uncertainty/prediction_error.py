@@ -8,11 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from shoal.identification.conventions import LEVEL
 from shoal.identification.forward import ForwardModel
 from shoal.identification.recording.measurement import HeldOut
 from shoal.identification.uncertainty.chances import chi_square_above
 from shoal.identification.uncertainty.covariance import Block
-from shoal.identification.uncertainty.linearisation import ABSORBED, LEVEL, Linearisation, linearise, quantile
+from shoal.identification.uncertainty.linearisation import ABSORBED, Linearisation, linearise, quantile
 from shoal.identification.uncertainty.sensitivity import Sensitivity
 from shoal.identification.uncertainty.uncertain_inputs import Given
 from shoal.trajectory import Array

@@ -7,14 +7,13 @@ from math import gcd
 
 import numpy as np
 
+from shoal.identification.conventions import HIDDEN
 from shoal.identification.forward import ForwardModel
 from shoal.identification.problem import MEASUREMENT, RESERVED
 from shoal.identification.uncertainty.linearisation import Linearisation
 from shoal.trajectory import Array
 
 _INVOLVED = 1e-2
-_EXACT = 1e-3
-"""An exponent's share in an open direction that counts as none."""
 _POWERS = range(-3, 4)
 _MOST = 5
 """Parameters in a product, at most."""
@@ -64,7 +63,7 @@ def products(open_directions: Array, names: list[str]) -> list[str]:
     candidates.sort(key=lambda n: (np.count_nonzero(n), np.abs(n).sum(), *(-n)))
     chosen: list[Array] = []
     for powers in candidates:
-        if np.linalg.norm(powers @ directions) > _EXACT * np.linalg.norm(powers):
+        if np.linalg.norm(powers @ directions) > HIDDEN * np.linalg.norm(powers):
             continue
         if np.linalg.matrix_rank(np.array([*chosen, powers])) > len(chosen):
             chosen.append(powers)

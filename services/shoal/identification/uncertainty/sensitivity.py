@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from shoal.identification.conventions import DIFFERENCE
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods.growth import LARGE, growth
 from shoal.trajectory import Array
@@ -23,7 +24,6 @@ _SURE = 1e-4
 """Relative difference of two derivatives between which no other step need decide."""
 AGREED = 1e-2
 """Relative difference of two derivatives that count as one."""
-_NOTHING = 1e-6
 _ROUNDS = 4
 _WELL_CONDITIONED = 1e3
 _NONE = 1e-200
@@ -174,7 +174,7 @@ def _differences(
     # the measure of that, and not what chaos magnifies.
     size = np.linalg.norm(columns, axis=0)
     usual = min(float(np.max(size)), np.sqrt(columns.shape[0]) * model.rows.signal)
-    nothing = (doubts > AGREED) & (np.minimum(size, least) < _NOTHING * usual)
+    nothing = (doubts > AGREED) & (np.minimum(size, least) < DIFFERENCE * usual)
     columns[:, nothing], doubts[nothing], errors[:, nothing] = 0.0, 0.0, 0.0
     return columns, doubts, errors
 

@@ -13,8 +13,9 @@ from itertools import islice
 
 import numpy as np
 
+from shoal.identification.conventions import HARDLY
 from shoal.identification.diagnostics.minima.other_starts import turned
-from shoal.identification.diagnostics.minima.rivals import FOLLOWED_WITHIN, apart, beside_samples, turn_of_samples
+from shoal.identification.diagnostics.minima.rivals import apart, beside_samples, turn_of_samples
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods.auto import explained
 from shoal.identification.methods.lanes import Descent, descend_many, differentiate_many, distinct
@@ -87,7 +88,7 @@ def _first_part(model: ForwardModel) -> ForwardModel:
 def _limit(model: ForwardModel, point: Array) -> float:
     """Up to which fitness a point explains a part of the record about as well as the answer."""
     mine = float(model.cost(model.uncounted(point[None]))[0])
-    return mine + (FOLLOWED_WITHIN * model.rows.signal) ** 2 * len(model.rows.time) / model.rows.samples
+    return mine + (HARDLY * model.rows.signal) ** 2 * len(model.rows.time) / model.rows.samples
 
 
 def _line(model: ForwardModel, point: Array, k: int, values: Array) -> Array:

@@ -15,8 +15,9 @@ from itertools import combinations, product
 
 import numpy as np
 
+from shoal.identification.conventions import GROSS, HARDLY
 from shoal.identification.diagnostics.minima.other_starts import mirrored, turned, within_bounds
-from shoal.identification.diagnostics.minima.rivals import FOLLOWED_WITHIN, apart
+from shoal.identification.diagnostics.minima.rivals import apart
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods.lanes import Descent, descend_many, kept_apart
 from shoal.identification.methods.outcome import Outcome
@@ -26,8 +27,6 @@ from shoal.trajectory import Array
 _MOST = 256
 """Images by each combination of reflections; of machines with more only those of all angles, and of single ones."""
 _SIMULATED, _FOLLOWED = 16, 4
-_ALIKE = 0.05
-"""Of the spread of the data: deviation of an image's first channels from those of the answer."""
 
 
 def mirror_images(model: ForwardModel, outcome: Outcome) -> list[Descent]:
@@ -39,7 +38,7 @@ def mirror_images(model: ForwardModel, outcome: Outcome) -> list[Descent]:
         return []
     values = model.cost(model.uncounted(points))
     left = np.sqrt(np.maximum(values - outcome.fitness, 0.0) * model.rows.samples / len(model.rows.time))
-    good = [k for k in np.argsort(values, kind="stable") if left[k] < FOLLOWED_WITHIN * model.rows.signal][:_FOLLOWED]
+    good = [k for k in np.argsort(values, kind="stable") if left[k] < HARDLY * model.rows.signal][:_FOLLOWED]
     if not good:
         return []
     *descents, own = descend_many(model, np.vstack([points[good], outcome.point]))
@@ -133,4 +132,4 @@ def _alike(model: ForwardModel, point: Array, candidates: Array) -> Array:
                 size = float(np.nanstd(recording.values[:, k]))
                 off = np.maximum(off, np.abs(difference) / max(size, 1e-300))
     order = np.argsort(np.where(np.isfinite(off), off, np.inf), kind="stable")[:_SIMULATED]
-    return np.asarray(candidates[[k for k in order if off[k] <= _ALIKE]])
+    return np.asarray(candidates[[k for k in order if off[k] <= GROSS]])

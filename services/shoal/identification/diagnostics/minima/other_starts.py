@@ -14,6 +14,7 @@ from itertools import product
 
 import numpy as np
 
+from shoal.identification.conventions import DIFFERENCE, ROUND_OFF
 from shoal.identification.diagnostics.minima.rivals import turn_of_samples
 from shoal.identification.forward import ForwardModel
 from shoal.mechanics.numerics.newton import newton
@@ -28,11 +29,8 @@ _TURNS = 3
 """So many times more, either way, a body may turn between two samples."""
 _MOST = 256
 """Combinations of images of several bodies; of more only those in which all or all but one are of one kind."""
-_OFF = 1e-6
-"""Of a number beside 1: what a start may differ by from the one that is wanted."""
 _STEPS = 5
 """Of Newton's method, for ties that are not linear."""
-_SMALL = 1e-9
 _ABOUT_Z = {"rotation": "angle", "spin": "rate"}
 """What a start may say in place of a vector."""
 
@@ -151,8 +149,10 @@ class _ReachableStart:
             image = isometry @ here @ inner
             vector = vector_of(image)
             angle = float(np.linalg.norm(vector))
-            ways = [np.array(start.rotation)] if np.allclose(image, here, atol=_OFF) and start.rotation else [vector]
-            if angle > _OFF and ways[0] is vector:
+            ways = (
+                [np.array(start.rotation)] if np.allclose(image, here, atol=DIFFERENCE) and start.rotation else [vector]
+            )
+            if angle > DIFFERENCE and ways[0] is vector:
                 ways.append(vector * (1.0 - 2 * np.pi / angle))
             stated = [self._wanted(body, rotation=way, **moved) for way in ways]
             if possible := [one for one in stated if one is not None]:
@@ -184,7 +184,7 @@ class _ReachableStart:
             for path, x, old in zip(paths, vector.tolist(), padded(known, 3), strict=True):
                 if path in self.sought:
                     wanted[path] = x
-                elif abs(x - old) > _OFF * (1.0 + abs(old)):
+                elif abs(x - old) > DIFFERENCE * (1.0 + abs(old)):
                     return None
         return wanted
 
@@ -205,7 +205,7 @@ class _ReachableStart:
             return np.asarray(target - self._made(values[None], paths)[0])
 
         def met(off: Array) -> bool:
-            return bool(np.all(np.abs(off) <= _OFF * (1.0 + np.abs(target))))
+            return bool(np.all(np.abs(off) <= DIFFERENCE * (1.0 + np.abs(target))))
 
         def correct(values: Array) -> tuple[Array, float]:
             if met(off := left(values)):
@@ -284,6 +284,6 @@ def _directions(vectors: list[Array]) -> list[Array]:
     found: list[Array] = []
     for vector in vectors:
         size = float(np.linalg.norm(vector))
-        if size > _SMALL and all(abs(vector @ other) < (1.0 - _SMALL) * size for other in found):
+        if size > ROUND_OFF and all(abs(vector @ other) < (1.0 - ROUND_OFF) * size for other in found):
             found.append(vector / size)
     return found

@@ -8,21 +8,20 @@ from functools import partial
 
 import numpy as np
 
+from shoal.identification.conventions import LEVEL
 from shoal.identification.diagnostics.hypotheses import Hypothesis
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods.lanes import UNDAMPED, damped_step, differentiate_many, differing, kept_apart
 from shoal.identification.methods.outcome import Outcome
 from shoal.identification.uncertainty.chances import chi_square_above
 from shoal.identification.uncertainty.intervals import Value
-from shoal.identification.uncertainty.linearisation import LEVEL, Linearisation
+from shoal.identification.uncertainty.linearisation import Linearisation
 from shoal.mechanics.numerics.levenberg_marquardt import levenberg_marquardt
 from shoal.mechanics.numerics.tile import Index
 from shoal.trajectory import Array
 
 ALIAS = "the same at every sample, and apart between samples"
 """What an answer's alias is to it."""
-FOLLOWED_WITHIN = 0.3
-"""Of the spread of the data: what starts leave (RMS) beyond the answer, from which a descent is worth its runs."""
 _EVEN = 1e-3
 """Steps between samples that differ by no more of themselves are even."""
 _PART = 0.382

@@ -6,12 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from shoal.identification.conventions import DIFFERENCE
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods.lanes import nearest_attitudes
 from shoal.identification.methods.outcome import Outcome
 from shoal.trajectory import Array
 
-_ALIKE, _UNRESOLVED = 1e-3, 1e-6
+_ALIKE = 1e-3
 """Of the fitness, and of the signal: what turns may change by the growth of round-off."""
 
 
@@ -24,7 +25,7 @@ def with_nearest_turns(model: ForwardModel, outcome: Outcome) -> Outcome:
     if not np.isfinite(outcome.fitness) or np.array_equal(turned, outcome.point):
         return outcome
     fitness = float(model.cost(model.uncounted(turned[None]))[0])
-    if not fitness <= outcome.fitness * (1.0 + _ALIKE) + (_UNRESOLVED * model.rows.signal) ** 2:
+    if not fitness <= outcome.fitness * (1.0 + _ALIKE) + (DIFFERENCE * model.rows.signal) ** 2:
         return outcome
     minima = [(nearest_turns(model, point), value) for point, value in outcome.minima]
     return replace(outcome, point=turned, fitness=fitness, minima=minima)

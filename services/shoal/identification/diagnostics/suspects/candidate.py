@@ -9,6 +9,7 @@ from typing import Literal
 
 import numpy as np
 
+from shoal.identification.conventions import ROUND_OFF
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods.lanes import Descent, descend_each, difference_at
 from shoal.identification.methods.least_squares import PATIENCE
@@ -54,7 +55,12 @@ def size_of(scene: Scene) -> Size:
     return Size(mass, max([*lengths, 1e-3]), reach, gravity)
 
 
-_TINY = 1e-9
+FACTOR = 2.0
+"""A positive number that is stated (a mass, a clock) is looked for within this factor."""
+PROBE = 1e-4
+"""Change by which an effect is measured, relative to the range that is looked for: small against the curvature of the
+motion, and far above the accuracy of the integrator.
+"""
 _NEAR = 1.04
 """An effect that goes with one over a number is followed by this factor from where it was probed."""
 
@@ -121,7 +127,7 @@ class FaultHypothesis:
     def vector(self, values: Array) -> Array:
         """Values as the components of a point, (numbers,)."""
         both = zip(values, self.parameters, strict=True)
-        return np.array([np.log(max(x, _TINY * p.upper)) if p.logarithmic else x for x, p in both])
+        return np.array([np.log(max(x, ROUND_OFF * p.upper)) if p.logarithmic else x for x, p in both])
 
     def at(self, way: int, amounts: Array) -> Array:
         """The values within their bounds at which the effects are so many times those of the probes, (numbers,)."""

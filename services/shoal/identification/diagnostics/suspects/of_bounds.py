@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
+from shoal.identification.conventions import DIFFERENCE
 from shoal.identification.forward import ForwardModel
 from shoal.identification.problem import Parameter
 from shoal.identification.recording.units import unit
 from shoal.trajectory import Array
 
-_AT_BOUND = 1e-6
-"""Of the range."""
 _WIDER = 3.0
 """Ranges of a parameter on either side; of one that is known by its order of magnitude, of its logarithm."""
 
 
 def at_bound(model: ForwardModel, point: Array) -> list[int]:
     """Return which parameters of a point (parameters,) are at a bound."""
-    near = np.minimum(point - model.lower, model.upper - point) < _AT_BOUND * (model.upper - model.lower)
+    near = np.minimum(point - model.lower, model.upper - point) < DIFFERENCE * (model.upper - model.lower)
     return [int(k) for k in np.flatnonzero(near)]
 
 

@@ -9,7 +9,8 @@ from typing import Any, Literal
 import numpy as np
 
 from shoal.errors import InputError
-from shoal.identification.diagnostics.suspects.candidate import FaultHypothesis, Size, size_of
+from shoal.identification.conventions import DIFFERENCE
+from shoal.identification.diagnostics.suspects.candidate import FACTOR, PROBE, FaultHypothesis, Size, size_of
 from shoal.identification.forward import ForwardModel
 from shoal.identification.problem import Parameter
 from shoal.mechanics.start.start import is_direct
@@ -20,17 +21,10 @@ from shoal.trajectory import Array
 
 RESISTING = {"friction": "friction", "drag": "quadratic drag", "coulomb": "dry friction"}
 """Fields of joints that resist a motion by laws of their own, and what suspects call them."""
-_FACTORS = 2.0
-_STEP = 1e-3
-"""Of the largest value that is looked for: the change by which an effect is measured."""
-_SLIGHT = 1e-6
-"""As _STEP, of friction: its laws are so alike that the curvature of a larger change hides what distinguishes them."""
 _SHIFT = 0.2
 """Of the size of the machine, how far off a pivot is looked for."""
 _ABOUT = 0.03
 """Of how far a marker is off: nearer to another named point of its body it is taken to be there."""
-_NOTHING = 1e-6
-"""Of the machine: a further mass that is none."""
 
 
 def of_machine(model: ForwardModel) -> Iterator[FaultHypothesis]:
@@ -62,7 +56,7 @@ def resisting(name: str, joint: Resisted, field: str, size: Size) -> FaultHypoth
     upper = {"friction": force / rate, "drag": force / rate**2, "coulomb": 0.5 * force}[field]
     stated, path = float(getattr(joint, field)), f"joints.{name}.{field}"
     bounds = (0.0, max(upper, 4 * stated))
-    return FaultHypothesis.single(f"{RESISTING[field]} of {name}", path, stated, bounds, stated + _SLIGHT * upper)
+    return FaultHypothesis.single(f"{RESISTING[field]} of {name}", path, stated, bounds, stated + DIFFERENCE * upper)
 
 
 def _masses(scene: Scene, size: Size) -> Iterator[FaultHypothesis]:
@@ -74,13 +68,13 @@ def _masses(scene: Scene, size: Size) -> Iterator[FaultHypothesis]:
         if place in seen.values():
             continue
         further, seen[name] = f"further-{name}", place
-        loaded["bodies"][further] = {"kind": "point-mass", "mass": _NOTHING * size.mass}
+        loaded["bodies"][further] = {"kind": "point-mass", "mass": DIFFERENCE * size.mass}
         loaded["joints"][further] = {"kind": kind, "first": loaded["markers"][name], "second": {"body": further}}
     with suppress(InputError):
         with_masses = Scene.parse(loaded)
         for name in seen:
-            path, bounds = f"bodies.further-{name}.mass", (_NOTHING * size.mass, size.mass)
-            yield FaultHypothesis.single(f"mass at {name}", path, 0.0, bounds, _STEP * size.mass, scene=with_masses)
+            path, bounds = f"bodies.further-{name}.mass", (DIFFERENCE * size.mass, size.mass)
+            yield FaultHypothesis.single(f"mass at {name}", path, 0.0, bounds, PROBE * size.mass, scene=with_masses)
     for name, body in scene.bodies.items():
         if len(scene.bodies) == 1 and not (isinstance(body, RigidBody) and np.any(body.inertia)):
             continue  # all forces go with its mass, but for friction, which is a candidate itself
@@ -110,9 +104,9 @@ def _lengths(scene: Scene) -> Iterator[FaultHypothesis]:
 
 def _ratio(name: str, path: str, stated: float) -> FaultHypothesis:
     """A number known to within a factor."""
-    lower, upper = sorted((stated / _FACTORS, stated * _FACTORS))
+    lower, upper = sorted((stated / FACTOR, stated * FACTOR))
     law: Literal["log", "linear"] = "log" if stated > 0 else "linear"
-    return FaultHypothesis.single(name, path, stated, (lower, upper), stated * (1 + _STEP), law=law, factor=True)
+    return FaultHypothesis.single(name, path, stated, (lower, upper), stated * (1 + PROBE), law=law, factor=True)
 
 
 def _pivots(scene: Scene, size: Size) -> Iterator[FaultHypothesis]:
@@ -153,7 +147,7 @@ def _joints_on_bodies(scene: Scene) -> Iterator[FaultHypothesis]:
 def _near(name: str, path: str, stated: float, width: float, scene: Scene | None = None) -> FaultHypothesis:
     """A number known to within a width."""
     bounds = (stated - width, stated + width)
-    return FaultHypothesis.single(name, path, stated, bounds, stated + _STEP * width, scene=scene)
+    return FaultHypothesis.single(name, path, stated, bounds, stated + PROBE * width, scene=scene)
 
 
 def _positions(model: ForwardModel) -> list[str]:
@@ -186,7 +180,7 @@ def _marker(name: str, place: tuple[float, ...], width: float, scene: Scene) -> 
     body = scene.markers[name].body
     base, words = np.array([place]), f"place of the marker {name} on {body}"
     points = {point: np.array(padded(at, len(place))) for point, at in scene.bodies[body].points.items()}
-    probes = (base + _STEP * width * np.eye(len(place)))[None]
+    probes = (base + PROBE * width * np.eye(len(place)))[None]
 
     def describe(values: Array) -> tuple[float, str]:
         there, stated = (", ".join(f"{x:.4g}" for x in one) for one in (values, place))
@@ -211,7 +205,7 @@ def _rates(scene: Scene, size: Size) -> Iterator[FaultHypothesis]:
             continue
         rate, most = scene.start(name).rate, 10.0 * size.rate
         words, path, bounds = f"rate of {name} at the start", f"initial.{name}.rate", (rate - most, rate + most)
-        yield FaultHypothesis.single(words, path, rate, bounds, rate + _STEP * size.rate, alone=not direct)
+        yield FaultHypothesis.single(words, path, rate, bounds, rate + PROBE * size.rate, alone=not direct)
 
 
 def _spins(scene: Scene, size: Size) -> Iterator[FaultHypothesis]:
@@ -220,7 +214,7 @@ def _spins(scene: Scene, size: Size) -> Iterator[FaultHypothesis]:
         for axis, rate in enumerate(scene.start(name).spin or ()):
             words, path, most = f"spin of {name} about {'xyz'[axis]} at the start", f"initial.{name}.spin.{axis}", 10.0
             bounds = (rate - most * size.rate, rate + most * size.rate)
-            yield FaultHypothesis.single(words, path, rate, bounds, rate + _STEP * size.rate)
+            yield FaultHypothesis.single(words, path, rate, bounds, rate + PROBE * size.rate)
 
 
 _CONSTANT = 100.0
@@ -265,7 +259,7 @@ def _candidate(name: str, size: Size, scene: Scene) -> FaultHypothesis:
         Parameter(path=f"loads.further-spring-{name}.stiffness", lower=0.0, upper=most),
         Parameter(path=f"loads.further-torque-{name}.torque", lower=-np.pi * most, upper=np.pi * most),
     )
-    probes = np.array([[[_STEP * most, 0.0], [0.0, _STEP * most]]])
+    probes = np.array([[[PROBE * most, 0.0], [0.0, PROBE * most]]])
 
     def describe(values: Array) -> tuple[float, str]:
         stiffness, torque = values.tolist()

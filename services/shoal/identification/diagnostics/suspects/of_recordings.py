@@ -8,7 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
-from shoal.identification.diagnostics.suspects.candidate import FaultHypothesis, size_of
+from shoal.identification.diagnostics.suspects.candidate import FACTOR, PROBE, FaultHypothesis, size_of
 from shoal.identification.forward import ForwardModel
 from shoal.identification.problem import RESERVED, Parameter
 from shoal.identification.recording.measurement import Recording
@@ -16,14 +16,11 @@ from shoal.identification.recording.reading import whole_turns
 from shoal.identification.recording.source import Channel, units_of
 from shoal.trajectory import Array
 
-_FACTORS = 2.0
-"""Clock, scale and gravity are looked for within this factor."""
 _LATE = 0.2
 _EARLY = 0.5
 """Of the record: how much may be missing after the release, and how long the machine may be held before it."""
 _SHORTEST, _HOLDS = 0.005, 9
 """Of the record, the shortest hold that is tried, and how many up to the longest."""
-_STEP = 1e-4
 _MOST = 6
 """Recordings that have candidates of their own."""
 _SENSORS = {
@@ -48,8 +45,8 @@ def of_measurement(model: ForwardModel) -> Iterator[FaultHypothesis]:
     axes = np.flatnonzero(model.scene.gravity)
     if len(axes) == 1 and (axes[0] == 1 or model.scene.dimensions == 3):
         size = model.scene.gravity[axes[0]]
-        lower, upper = sorted((size / _FACTORS, size * _FACTORS))
-        probe = size * (1 + _STEP)
+        lower, upper = sorted((size / FACTOR, size * FACTOR))
+        probe = size * (1 + PROBE)
         yield FaultHypothesis.single(
             "gravity", f"gravity.{axes[0]}", size, (lower, upper), probe, "measurement", factor=True
         )
@@ -64,7 +61,7 @@ def _of(runs: list[Recording], name: str | None = None) -> Iterator[FaultHypothe
     end = max(float(run.times[-1]) for run in runs)
     for field in ("clock", "scale") if positions else ("clock",):
         stated = float(getattr(first.stated, field))
-        bounds, probe = (stated / _FACTORS, stated * _FACTORS), stated * (1 + _STEP)
+        bounds, probe = (stated / FACTOR, stated * FACTOR), stated * (1 + PROBE)
         path = f"{RESERVED}.{field}"
         yield FaultHypothesis.single(
             field + of, path, stated, bounds, probe, "measurement", law="log", factor=True, own=own
@@ -75,7 +72,7 @@ def _of(runs: list[Recording], name: str | None = None) -> Iterator[FaultHypothe
     }
     for field, width in shifts.items():
         stated = float(getattr(first.stated, field))
-        bounds, probe = (stated - width, stated + width), stated + _STEP * width
+        bounds, probe = (stated - width, stated + width), stated + PROBE * width
         yield FaultHypothesis.single(field + of, f"{RESERVED}.{field}", stated, bounds, probe, "measurement", own=own)
     yield _delay(f"delay{of}", first.stated.delay, end, own)
 
@@ -88,7 +85,7 @@ def _delay(name: str, stated: float, end: float, own: tuple[str, ...]) -> FaultH
     bounds = (stated - _EARLY * end, stated + _LATE * end)
     free = Parameter(path=f"{RESERVED}.delay", lower=bounds[0], upper=bounds[1], scale="linear", own=own or False)
     held = end * np.geomspace(_SHORTEST, _EARLY, _HOLDS)
-    probes = np.append(stated + _STEP * end, stated - held).reshape(-1, 1, 1)
+    probes = np.append(stated + PROBE * end, stated - held).reshape(-1, 1, 1)
     bases = np.full((len(probes), 1), stated)
     return FaultHypothesis(name, "measurement", (free,), (stated,), probes, bases)
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from shoal.identification.diagnostics.residual_tests import MAD, OUTLIER
+from shoal.identification.conventions import MAD, OUTLIER
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods.lanes import descend_many
 from shoal.identification.methods.starts import starting_points

@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 
 from shoal.errors import InputError
-from shoal.identification.diagnostics.suspects.candidate import FaultHypothesis, Size, size_of
+from shoal.identification.diagnostics.suspects.candidate import PROBE, FaultHypothesis, Size, size_of
 from shoal.identification.forward import ForwardModel
 from shoal.identification.problem import Parameter
 from shoal.scene import Rod, Scene
@@ -27,7 +27,6 @@ _SLOWEST, _FASTEST, _MOST_WAYS = 0.3, 5.0, 48
 """Of the rate of a swing: the frequencies that are tried, and how many at most."""
 _APART = np.pi / 2
 """Of the phase at the end of the record, between neighbouring frequencies [rad]."""
-_STEP = 1e-3
 _MOST = 0.2
 """Of the machine's length: the effect that is measured, and the largest motion that is looked for."""
 _BLOCK = "shaken-block"
@@ -89,7 +88,7 @@ def _candidate(
         Parameter(path=f"loads.{_BLOCK}.stiffness", lower=stiffness[0] / 4, upper=stiffness[-1] * 4, scale="log"),
     )
     bases = np.array([[stated, 0.0, k] for k in stiffness])
-    step = _STEP * size.length
+    step = PROBE * size.length
     ways = zip(stiffness, rates, strict=True)
     probes = np.array([[[stated + step, 0.0, k], [stated, step * rate, k]] for k, rate in ways])
     name, values = f"motion of the pivot {joint} along {'xy'[axis]}", (stated, 0.0, float(stiffness[0]))

@@ -16,6 +16,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from shoal.identification.conventions import DIFFERENCE, GROSS, MOSTLY, SEVERAL
 from shoal.identification.deadline import TimeIsUp
 from shoal.identification.diagnostics.hypotheses import SAMPLES, Effects, Hypothesis, ScoreTest, Suspect, penalty, table
 from shoal.identification.diagnostics.suspects.candidate import FaultHypothesis, Together, groups_of
@@ -26,7 +27,6 @@ from shoal.identification.diagnostics.suspects.of_samples import LeftOut, record
 from shoal.identification.diagnostics.suspects.other_mechanisms import bending, shaken
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods.lanes import Descent, descend_many
-from shoal.identification.methods.outcome import GROSS
 from shoal.identification.methods.starts import starting_points
 from shoal.identification.recording.units import of_channels
 from shoal.identification.uncertainty.covariance import blocks_of
@@ -48,20 +48,13 @@ _HOPELESS = 0.98
 _SHARES = np.array([1.0, 0.5, 0.2, 0.05, 0.0])
 """Of the change that the regression promises, from the best of which a fit starts."""
 _SCAN = 11
-_UNSEEN = 1e-6
 _ALIKE = 0.999
 """Cosine of two effects beyond what the parameters follow: from here on small faults are not distinguished."""
 _BETTER = 0.99
 """Of the misfit: a lower one with nothing changed is that of a better minimum."""
 _PATIENCE = 10.0
-_CONSTANT = 0.5
-"""Of the signal: an explanation that leaves more is none, as a constant leaves hardly more."""
-_FAR = 3.0
-"""Times the misfit of the best: what leaves more is not listed."""
 _WHOLLY = 1.1
 """Times the noise: what leaves no more explains a misfit wholly."""
-_SMALL = 3.0
-"""Times the noise: a misfit that several causes may explain wholly."""
 
 
 @dataclass(frozen=True)
@@ -121,9 +114,9 @@ def suspects(
         cut = False
     rows = len(residual)
     # Clock and gravity explain a free swing equally well: the order of equals is that of their names.
-    reported = (suspect for suspect in search.found if suspect.after < _CONSTANT * model.rows.signal)
+    reported = (suspect for suspect in search.found if suspect.after < MOSTLY * model.rows.signal)
     found = sorted(reported, key=lambda s: (float(f"{s.cost(rows):.2e}"), s.name))
-    listed = [suspect for suspect in found if suspect.cost(rows) <= _FAR**2 * found[0].cost(rows)]
+    listed = [suspect for suspect in found if suspect.cost(rows) <= SEVERAL**2 * found[0].cost(rows)]
     refits = {(s.name, s.kind): search.refits[s.name, s.kind] for s in listed if (s.name, s.kind) in search.refits}
     named = [replace(s, alike=search.alike(s.name)) for s in listed]
     return FaultSearch(named, refits, search.better, cut, search.hypotheses, search.measured)
@@ -212,7 +205,7 @@ class _FaultSearch:
 
     def _near(self, scored: list[_Scored]) -> list[_Scored]:
         """Those that promise hardly less than the best."""
-        return [s for s in scored if s.promise < _FAR * scored[0].promise]
+        return [s for s in scored if s.promise < SEVERAL * scored[0].promise]
 
     def alike(self, name: str) -> tuple[str, ...]:
         """Candidates whose small faults have the same effect as that of one by name."""
@@ -237,7 +230,7 @@ class _FaultSearch:
         """Return whether the best explanation leaves no more than noise, of what was so large that another would
         not.
         """
-        return self._least <= _WHOLLY * self.noise and self.before > _SMALL * self.noise
+        return self._least <= _WHOLLY * self.noise and self.before > SEVERAL * self.noise
 
     def _scored(self, together: Together) -> list[_Scored]:
         """The regressions of the residual on the effects of candidates of one machine, by one call."""
@@ -264,7 +257,7 @@ class _FaultSearch:
             return None
         candidate = together.group[number]
         own = effects - effects @ self.basis @ self.basis.T
-        if np.linalg.norm(own) <= _UNSEEN * np.linalg.norm(effects):
+        if np.linalg.norm(own) <= DIFFERENCE * np.linalg.norm(effects):
             return None
         left = self.residual - self.basis @ (self.basis.T @ self.residual)
         wanted = np.asarray(np.linalg.lstsq(own.T, -left)[0], dtype=float)
@@ -323,7 +316,7 @@ class _FaultSearch:
     def _follow(self) -> None:
         """Descend on where a fit was the best but for what it had still to go."""
         begun = sorted(self.unfinished, key=lambda entry: entry[0])
-        for _, candidate, point in [entry for entry in begun if entry[0] <= _FAR * self._least][:_FOLLOWED]:
+        for _, candidate, point in [entry for entry in begun if entry[0] <= SEVERAL * self._least][:_FOLLOWED]:
             self._keep(candidate, *descend_many(candidate.freed(self.model), point[None]))
 
     def _keep(self, candidate: FaultHypothesis, end: Descent) -> None:
