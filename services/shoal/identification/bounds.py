@@ -10,9 +10,6 @@ from shoal.errors import InputError
 from shoal.identification.conventions import PRECISION
 from shoal.scene import Scene
 
-_HALVINGS = 60
-"""Until no number lies between what can be and what cannot."""
-
 
 def accepts(scene: Scene, values: Mapping[str, float]) -> bool:
     """Return whether a scene may have values at paths."""
@@ -35,8 +32,7 @@ def possible_bound(
         inside, outside = float(scene.value(path)), bound
     except (InputError, TypeError, ValueError):
         return None
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (inside + outside)
+    while (middle := 0.5 * (inside + outside)) not in (inside, outside):
         inside, outside = (middle, outside) if accepts(scene, fields(middle)) else (inside, middle)
     if abs(inside) < PRECISION * abs(bound):
         return None

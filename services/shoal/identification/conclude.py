@@ -13,7 +13,6 @@ import numpy as np
 from shoal.identification import findings as kinds
 from shoal.identification.adapt import AdaptedModel
 from shoal.identification.assemble import assemble
-from shoal.identification.conventions import DIFFERENCE
 from shoal.identification.deadline import unless_late
 from shoal.identification.diagnostics.judgement import Judgement, judge
 from shoal.identification.diagnostics.minima.turns import with_nearest_turns
@@ -24,7 +23,7 @@ from shoal.identification.forward import ForwardModel
 from shoal.identification.lengthening import lengthened
 from shoal.identification.methods.growth import FRACTAL, LARGE, growth
 from shoal.identification.methods.lanes import Descent, descend_many, descend_on
-from shoal.identification.methods.outcome import Outcome
+from shoal.identification.methods.outcome import Outcome, lowers
 from shoal.identification.surroundings import Surroundings, surroundings
 from shoal.identification.uncertainty.profiles import Profile
 
@@ -122,7 +121,7 @@ def _lower(model: ForwardModel, outcome: Outcome, profiled: dict[str, Profile]) 
     places = [found.place for found in profiled.values() if found.better]
     ends = descend_many(model, np.array(places)) if places else []
     best = min(ends, key=lambda end: end.fitness, default=None)
-    return best if best is not None and best.fitness < outcome.fitness * (1.0 - DIFFERENCE) else None
+    return best if best is not None and lowers(model, best.fitness, outcome.fitness) else None
 
 
 def _followed(outcome: Outcome, better: Descent) -> Outcome:

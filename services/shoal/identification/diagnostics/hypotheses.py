@@ -149,7 +149,7 @@ class ScoreTest:
         """Return the drop of chi-square, its p-value, the share of the mean square, and the unit effect (rows,).
 
         effects: of the numbers that are freed together, (numbers, rows). A noise that is estimated holds the fault, if
-        there is one. Where the first p-value is small, it is estimated again with the fault taken out.
+        there is one: it is estimated again with the fault taken out.
         """
         size = np.linalg.norm(effects, axis=1)
         scaled = self._own(effects / np.where(size > 0.0, size, 1.0)[:, None])
@@ -157,9 +157,8 @@ class ScoreTest:
         own = left[:, singular > DIFFERENCE].T
         if not len(own):
             return 0.0, 1.0, 0.0, np.zeros(effects.shape[1])
-        first = self._test(own, self.noise)
-        if first[1] > _AGAIN or self.stated:
-            return first
+        if self.stated:
+            return self._test(own, self.noise)
         rest = self._own(self.residual)
         basis = np.column_stack([self.basis, own.T])
         return self._test(own, estimate_noise(rest - (rest @ own.T) @ own, basis, self.blocks))
@@ -210,9 +209,6 @@ def _part(block: Block, kept: Mask) -> Block:
     positions = np.concatenate([[0.0], np.cumsum(block.gaps)])[mine]
     return replace(block, rows=block.rows[mine], gaps=np.diff(positions))
 
-
-_AGAIN = 0.01
-"""P-value from which down a noise is estimated again."""
 
 Effects = Mapping[tuple[str, str, int], Sequence[Array]]
 """By name, kind and how many numbers are freed: the effects (effects, rows) by each way to measure them."""

@@ -28,6 +28,10 @@ _ROUNDS = 5
 _SMALL_GAIN = 1e-8
 """A step that promises to lower the fitness by less than this fraction is the end."""
 UNDAMPED, _LARGE_DAMPING = 1e-6, 1e12
+DESCENTS = 8
+"""Descents from the best starts, side by side: with their differences they fill the lanes of a call."""
+FEW = 3
+"""Descents that answer a question beside the search: a second and a third start hold when the first is a false one."""
 _APART = 0.02
 """Two starts are different if a parameter differs by more than this fraction of its range."""
 ENDS_APART = 1e-3

@@ -5,15 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from shoal.identification.forward import ForwardModel, Progress
-from shoal.identification.methods.lanes import SearchHistory, best_apart, descend_many
+from shoal.identification.methods.lanes import DESCENTS, SearchHistory, best_apart, descend_many
 from shoal.identification.methods.outcome import Outcome, concluded
 from shoal.identification.methods.starts import starting_points
 from shoal.trajectory import Array
 
 SCREENED = 128
 """Points that are looked at once."""
-STARTS = 16
-"""Descents from the best of them, and from every pose that the first samples allow."""
 
 
 def multi_start(model: ForwardModel, rng: np.random.Generator, progress: Progress) -> Outcome:
@@ -22,7 +20,9 @@ def multi_start(model: ForwardModel, rng: np.random.Generator, progress: Progres
     points = screened(model, poses, rng)
     course = SearchHistory(lambda *_: None)
     values = course.note(model.fitness(points))
-    starts = best_apart(model, np.concatenate([poses, points]), np.concatenate([np.zeros(len(poses)), values]), STARTS)
+    starts = best_apart(
+        model, np.concatenate([poses, points]), np.concatenate([np.zeros(len(poses)), values]), 2 * DESCENTS
+    )
     return concluded(model, descend_many(model, starts, progress), course)
 
 

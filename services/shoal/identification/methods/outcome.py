@@ -37,8 +37,7 @@ class Outcome:
     def joined(self, model: ForwardModel, ends: Sequence[Descent], where: str) -> Outcome:
         """Return the outcome with further minima, the best of which is the answer; `where` it was found is its choice.
 
-        A better one lowers the sum of squares by more than the mean square of a row, and so chi-square by more than
-        one, a standard deviation of one parameter. Of equals the answer is the one from the stated starts.
+        Of equals (see `lowers`) the answer is the one from the stated starts.
         """
         known, apart = [self.point, *(point for point, _ in self.minima)], list[Descent]()
         for end in sorted(ends, key=lambda one: one.fitness):
@@ -46,7 +45,7 @@ class Outcome:
                 known.append(end.point)
                 apart.append(end)
         minima = [*self.minima, *((end.point, end.fitness) for end in apart if end.converged)]
-        if not apart or apart[0].fitness >= self.fitness * (1.0 - 1.0 / len(model.rows.time)):
+        if not apart or not lowers(model, apart[0].fitness, self.fitness):
             return replace(self, minima=minima)
         return replace(self, minima=minima).moved(apart[0], where)
 
@@ -56,6 +55,15 @@ class Outcome:
         minima = [(self.point, self.fitness), *(end for end in self.minima if end[0] is not better.point)]
         there = replace(self, point=better.point, fitness=better.fitness, minima=minima, choice=choice)
         return replace(there, message=better.message and "no convergence", converged=better.converged)
+
+
+def lowers(model: ForwardModel, fitness: float, than: float) -> bool:
+    """Return whether a fitness is that of a better minimum than another one.
+
+    It lowers the sum of squares by more than the mean square of a row, and so chi-square by more than one: by more than
+    a standard deviation of one parameter.
+    """
+    return fitness < than * (1.0 - 1.0 / len(model.rows.time))
 
 
 Method = Callable[[ForwardModel, np.random.Generator, Progress], Outcome]

@@ -10,15 +10,13 @@ import numpy as np
 
 from shoal.identification.conventions import ROUND_OFF
 from shoal.identification.forward import ForwardModel
-from shoal.identification.methods.lanes import kept_apart
+from shoal.identification.methods.lanes import DESCENTS, kept_apart
 from shoal.mechanics.numerics.levenberg_marquardt import levenberg_marquardt
 from shoal.mechanics.numerics.tile import Index
 from shoal.trajectory import Array
 
 _CANDIDATES = 16
 """Poses that are tried for each angle."""
-_MOST = 8
-"""Starting points, at most."""
 _ITERATIONS = 30
 _GAIN = 1e-3
 """Poses are found where a step promises to lower the squared error by less than this part; an error below this [m] that
@@ -35,7 +33,7 @@ def starting_points(model: ForwardModel) -> Array:
     """
     stated = points = model.parameters.start[None]
     for name in model.measurement.recordings:
-        points = np.concatenate([_of_recording(model, point, name) for point in points])[:_MOST]
+        points = np.concatenate([_of_recording(model, point, name) for point in points])[:DESCENTS]
     entries = zip(model.parameters.initial, model.parameters.entries.values(), strict=True)
     if any(initial and entry.parameter.start is not None for initial, entry in entries):
         points = np.concatenate([points, stated])

@@ -12,6 +12,7 @@ import numpy as np
 
 from shoal.errors import InputError
 from shoal.findings import Finding
+from shoal.identification.conventions import NOTICED
 from shoal.identification.findings import UNCERTAIN_INPUT
 from shoal.identification.forward import ForwardModel
 from shoal.identification.recording.units import unit
@@ -26,8 +27,6 @@ from shoal.trajectory import Array
 
 EXACT = 1e9
 """Freedom of a variance that is stated."""
-_NOTICED = 0.2
-"""Of a variance: the part of something given from which on it is said."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +60,11 @@ class Given:
     def findings(self, at: Linearisation, names: Sequence[str]) -> list[Finding]:
         """Return which parameters it makes less certain, at a linearisation that has its share, if any."""
         shares, variance = np.diag(self._share(at)), np.diag(at.covariance)
-        widened = [name for name, part, all_ in zip(names, shares, variance, strict=True) if part > _NOTICED * all_ > 0]
+        widened = [
+            name
+            for name, part, all_ in zip(names, shares, variance, strict=True)
+            if part > (1.0 - (1.0 - NOTICED) ** 2) * all_ > 0
+        ]
         text = f"{self.what} widens the interval of {', '.join(widened)}{self.remedy}"
         return [UNCERTAIN_INPUT.found(text)] if widened else []
 

@@ -18,7 +18,7 @@ from shoal.identification.diagnostics.minima.other_starts import turned
 from shoal.identification.diagnostics.minima.rivals import apart, beside_samples, turn_of_samples
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods.auto import explained
-from shoal.identification.methods.lanes import Descent, descend_many, differentiate_many, distinct
+from shoal.identification.methods.lanes import DESCENTS, Descent, descend_many, differentiate_many, distinct
 from shoal.identification.methods.least_squares import PATIENCE
 from shoal.identification.methods.outcome import Outcome
 from shoal.identification.methods.progressive import extend
@@ -35,10 +35,6 @@ _SAMPLES = 40
 _VARYING = 0.5
 _COARSE, _MOST = 33, 2048
 """Points of a scan in the beginning, and at most."""
-_FOLLOWED = 8
-"""Dips that are followed, of each parameter."""
-_TURNED = 16
-"""Starts by more turns from which an answer that leaves a misfit is sought anew."""
 
 
 def aliases(model: ForwardModel, outcome: Outcome) -> list[Descent]:
@@ -68,7 +64,7 @@ def more_turns(model: ForwardModel, outcome: Outcome) -> list[Descent]:
     """Return the fit from starts that turn more often, or less, from sample to sample, of data not yet explained."""
     if turn_of_samples(model, _UNEVEN) is None or explained(model, outcome):
         return []
-    starts = list(islice(turned(model, outcome.point), _TURNED))
+    starts = list(islice(turned(model, outcome.point), 2 * DESCENTS))
     found = extend(model, np.array(starts), lambda *_: None) if starts else None
     return descend_many(model, found.point[None]) if found is not None and explained(model, found) else []
 
@@ -148,4 +144,4 @@ def _dips(model: ForwardModel, point: Array, k: int) -> Array:
     around = np.pad(costs, 1, constant_values=np.inf)
     dips = np.flatnonzero((costs < around[:-2]) & (costs <= around[2:]))
     good = [n for n in dips[np.argsort(costs[dips], kind="stable")] if apart(model, points[n], point)]
-    return points[good[:_FOLLOWED]]
+    return points[good[:DESCENTS]]

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from shoal.identification.conventions import MAD, OUTLIER
 from shoal.identification.forward import ForwardModel
-from shoal.identification.methods.lanes import descend_many
+from shoal.identification.methods.lanes import FEW, descend_many
 from shoal.identification.methods.starts import starting_points
 from shoal.identification.recording.measurement import Recording
 from shoal.trajectory import Array
@@ -19,7 +19,8 @@ _FEWEST, _GAP = 4, 3
 """Samples of a stretch, and from one of them to the next, at most."""
 _MOST = 0.5
 """Of the samples of a marker or a sensor: more of them are no stretch."""
-_STRETCHES, _STARTS = 2, 3
+_STRETCHES = 2
+"""At most: more of them are no lapse of a tracker, but a wrong model."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +60,7 @@ def stretches(model: ForwardModel, point: Array) -> Iterator[LeftOut]:
     robust = model.aside(problem=model.problem.model_copy(update={"loss": "cauchy"}))
     if not np.all(robust.loss_scale**2 > 0.0):  # without noise nothing is usual
         return
-    starts = np.vstack([point, starting_points(model)[:_STARTS]])
+    starts = np.vstack([point, starting_points(model)[:FEW]])
     best = min(descend_many(robust, starts), key=lambda end: end.fitness)
     plain = model.aside(problem=model.problem.model_copy(update={"loss": "squares"}))
     residual = plain.uncounted(best.point[None])[0, : len(model.rows.time)]

@@ -26,7 +26,8 @@ from shoal.identification.diagnostics.suspects.of_recordings import Reading, mis
 from shoal.identification.diagnostics.suspects.of_samples import LeftOut, recordings, stretches
 from shoal.identification.diagnostics.suspects.other_mechanisms import bending, shaken
 from shoal.identification.forward import ForwardModel
-from shoal.identification.methods.lanes import Descent, descend_many
+from shoal.identification.methods.lanes import DESCENTS, FEW, Descent, descend_many
+from shoal.identification.methods.outcome import lowers
 from shoal.identification.methods.starts import starting_points
 from shoal.identification.recording.units import of_channels
 from shoal.identification.uncertainty.covariance import blocks_of
@@ -34,15 +35,10 @@ from shoal.identification.uncertainty.intervals import Refit
 from shoal.identification.uncertainty.linearisation import followed
 from shoal.trajectory import Array
 
-_FITTED = 8
-"""Candidates that are fitted at a time."""
-_FOLLOWED = 3
-"""Fits that ended before they had converged are followed to their end, at most."""
 _DEAR = 2
 """Fitted at most of a kind that takes long to simulate; its scores are those of many values, and can be trusted."""
 _READ = 6
-"""Readings that are fitted, at most; and so many candidates after a scan."""
-_AFTER_SCAN = 3
+"""Readings that are fitted, at most."""
 _HOPELESS = 0.98
 """Of the present misfit: a promise of no less is not followed."""
 _SHARES = np.array([1.0, 0.5, 0.2, 0.05, 0.0])
@@ -50,8 +46,6 @@ _SHARES = np.array([1.0, 0.5, 0.2, 0.05, 0.0])
 _SCAN = 11
 _ALIKE = 0.999
 """Cosine of two effects beyond what the parameters follow: from here on small faults are not distinguished."""
-_BETTER = 0.99
-"""Of the misfit: a lower one with nothing changed is that of a better minimum."""
 _PATIENCE = 10.0
 _WHOLLY = 1.1
 """Times the noise: what leaves no more explains a misfit wholly."""
@@ -174,9 +168,9 @@ class _FaultSearch:
                 self._fit(self._near(better)[:_DEAR])
         # What lies near an answer that leaves little shows in the regression.
         if self._least > gross and not self._explained:
-            places = np.vstack([self.point, starting_points(self.model)[:3]])
+            places = np.vstack([self.point, starting_points(self.model)[:FEW]])
             scans = [s for group in self._groups(simple) for s in self._scanned(group, places)]
-            self._fit(sorted(scans, key=lambda s: s.promise)[:_AFTER_SCAN])
+            self._fit(sorted(scans, key=lambda s: s.promise)[:FEW])
         if not self._explained:
             self._follow()
         self._leave_out([one for one in whole if (one.name, one.kind) in significant])
@@ -194,8 +188,8 @@ class _FaultSearch:
         """Fit the most promising, then the next ones, until one explains the misfit wholly."""
         # A small fault does what its derivative says, a large one may do better.
         scored = scored if self.before > GROSS * self.model.rows.signal else self._near(scored)
-        for k in range(0, len(scored), _FITTED):
-            self._fit(scored[k : k + _FITTED])
+        for k in range(0, len(scored), DESCENTS):
+            self._fit(scored[k : k + DESCENTS])
             if self._explained:
                 break
 
@@ -307,7 +301,7 @@ class _FaultSearch:
         if not which:
             return
         wider = without_bounds(self.model, which)
-        starts = np.vstack([self.point, starting_points(wider)[:3]])
+        starts = np.vstack([self.point, starting_points(wider)[:FEW]])
         end = min(descend_many(wider, starts, patience=_PATIENCE), key=lambda one: one.fitness)
         for k in [k for k in which if not self.model.lower[k] <= end.point[k] <= self.model.upper[k]]:
             bound, value, change = describe_bound(self.model, self.point, end.point, k)
@@ -316,7 +310,7 @@ class _FaultSearch:
     def _follow(self) -> None:
         """Descend on where a fit was the best but for what it had still to go."""
         begun = sorted(self.unfinished, key=lambda entry: entry[0])
-        for _, candidate, point in [entry for entry in begun if entry[0] <= SEVERAL * self._least][:_FOLLOWED]:
+        for _, candidate, point in [entry for entry in begun if entry[0] <= SEVERAL * self._least][:FEW]:
             self._keep(candidate, *descend_many(candidate.freed(self.model), point[None]))
 
     def _keep(self, candidate: FaultHypothesis, end: Descent) -> None:
@@ -386,7 +380,7 @@ class _FaultSearch:
     def _leave_out(self, samples: Iterable[LeftOut]) -> None:
         """Fit the rest of the samples, from where all were fitted and from its own starts."""
         for one in samples:
-            starts = np.vstack([one.place(self.model, self.point), starting_points(one.model)[:3]])
+            starts = np.vstack([one.place(self.model, self.point), starting_points(one.model)[:FEW]])
             end = min(descend_many(one.model, starts, patience=_PATIENCE), key=lambda end: end.fitness)
             if not np.all(np.isfinite(end.residual)):
                 continue
@@ -416,7 +410,7 @@ class _FaultSearch:
             )
         self.tests += len(begun)
         for _, _, reading, starts in sorted(begun, key=lambda entry: entry[:2])[:_READ]:
-            ends = descend_many(reading.model, starts[:3], patience=_PATIENCE)
+            ends = descend_many(reading.model, starts[:FEW], patience=_PATIENCE)
             end = min(ends, key=lambda one: misfit(one.residual))
             self._test(reading.name, "data", 0, 1.0, reading.value, reading.change, end, reading.model)
 
@@ -427,5 +421,5 @@ class _FaultSearch:
             return
         ends = descend_many(self.model, np.array(promising), patience=_PATIENCE)
         best = min(ends, key=lambda end: end.fitness)
-        if misfit(best.residual) < _BETTER * self.before:
+        if lowers(self.model, misfit(best.residual) ** 2, self.before**2):
             self.better = best
