@@ -149,7 +149,7 @@ def _stepping(model: ForwardModel, step: float) -> ForwardModel:
 
 
 def repaced(model: ForwardModel, outcome: Outcome, progress: Progress) -> tuple[ForwardModel, Outcome]:
-    """What was found, or where least squares go from there where motions are faster than at the start. See `paced`."""
+    """Return the outcome, refitted with a shorter step where motions are faster than at the start. See `paced`."""
     shorter = paced(model, outcome.point)
     if shorter is model:
         return model, outcome

@@ -29,7 +29,7 @@ _NOTHING: dict[str, Any] = {"parameters": {}, "covariance": np.zeros((0, 0)), "t
 
 @dataclass(frozen=True)
 class Carried:
-    """What an estimate found, for use elsewhere.
+    """Transferred estimate: values, covariance and ties that other commands use.
 
     values: by path in the scene, ties evaluated; parameters: by name; left: what is not carried, and why
     uncertainties: by how much fields are off together, a standard deviation along each direction of what is left open
@@ -46,7 +46,7 @@ class Carried:
     trusted: bool = True
 
     def notes(self) -> list[str]:
-        """What has to be said wherever they are set."""
+        """Note that goes with these values wherever they are set."""
         notes = []
         if not self.trusted:
             notes.append(f"{self.source}: the verdict on these values is that they cannot be trusted")
@@ -120,7 +120,7 @@ def _unknown(joint: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def _uncertainties(joint: Mapping[str, Any]) -> tuple[dict[str, float], ...]:
-    """Of a joint distribution, see `joint`: what the fields of a scene change along its independent directions."""
+    """Changes of the fields of a scene along independent directions of a joint distribution, see `joint`."""
     known, covariance = joint["parameters"], joint["covariance"]
     size = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     whole = np.where(size > 0.0, size, 1.0)
@@ -163,7 +163,7 @@ def fitted(parameters: Parametrization, point: Array) -> tuple[dict[str, float],
 
 
 def joint(parameters: Parametrization, point: Array, covariance: Array, values: Mapping[str, Value]) -> dict[str, Any]:
-    """What an answer knows of the machine for use elsewhere, as plain data.
+    """Joint distribution of an answer for use elsewhere, as plain data.
 
     Of every parameter that is of the machine and of all recordings its path (None if it stands in ties only), value,
     whether its logarithm is the normal variable, and whether it is known; their covariance in their own units; ties of
@@ -194,7 +194,7 @@ def joint(parameters: Parametrization, point: Array, covariance: Array, values: 
 
 
 def of_estimate(estimate: Estimate) -> Carried:
-    """What an estimate carries."""
+    """Return the transferred values of an estimate."""
     known = {name: value.value for name, value in estimate.parameters.items()}
     parts = checked_joint(estimate.joint, "values", estimate.problem)
     return Carried(
@@ -209,7 +209,7 @@ def of_estimate(estimate: Estimate) -> Carried:
 
 
 def carried(found: Estimate | Path | str) -> Carried:
-    """What an estimate carries, or the JSON file of one. Raises InputError."""
+    """Return the transferred values of an estimate, or of the JSON file of one. Raises InputError."""
     from shoal.identification.estimate import Estimate
 
     if isinstance(found, str | Path):
@@ -222,7 +222,7 @@ def carried(found: Estimate | Path | str) -> Carried:
 
 
 def read_values(path: Path | str) -> Carried:
-    """What an estimate written by `shoal identify --json` or `--out FILE.json` carries. Raises InputError."""
+    """Return the values of an estimate written by `identify --json` or `--out FILE.json`. Raises InputError."""
     path = Path(path)
     data = read_estimate(path, "values", "values")
     values, left = data["values"], data["left_out"]

@@ -117,7 +117,7 @@ def _better(model: ForwardModel, outcome: Outcome, known: Surroundings, judgemen
 
 
 def _lower(model: ForwardModel, outcome: Outcome, profiled: dict[str, Profile]) -> Descent | None:
-    """Where a descent ends from what profiles found below the answer; None if nothing was."""
+    """Return the end of a descent from a place that a profile found below the answer; None if none was."""
     places = [found.place for found in profiled.values() if found.better]
     ends = descend_many(model, np.array(places)) if places else []
     best = min(ends, key=lambda end: end.fitness, default=None)

@@ -125,7 +125,7 @@ class Deadline:
 
 
 def unless_late(function: Callable[[], T], otherwise: T) -> T:
-    """What a function gives, or something else where no time is left for it."""
+    """Return the result of a function, or another value where no time is left for it."""
     try:
         return function()
     except TimeIsUp:

@@ -147,7 +147,7 @@ class Estimate(Concluded):
 
     @property
     def verdict(self) -> Verdict:
-        """What may be made of the answer: the worst verdict that its findings imply."""
+        """The worst verdict that its findings imply."""
         return verdict_of(self.findings)
 
     @property

@@ -21,7 +21,7 @@ from shoal.trajectory import Array
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """Of a point (parameters,).
+    """Residuals, derivatives, model error and tests at a point (parameters,).
 
     predicted: channels there by recording, (samples, channels)
     residual: there, (rows,); not finite where it cannot be simulated, or no time was left to
@@ -69,7 +69,7 @@ class Evidence:
 
     @property
     def correction(self) -> Corrections:
-        """What the model's error adds to the point."""
+        """Correction of the point by the model's error."""
         return self.error.corrections(self.at.pseudo_inverse)
 
 
@@ -114,7 +114,7 @@ def _size(model: ForwardModel, rows: Array | None) -> float | None:
 
 
 def _unseen(model: ForwardModel, residual: Array) -> Sensitivity:
-    """What is known of the neighbourhood of an answer where there is no time to look: nothing."""
+    """Empty sensitivity of an answer, where there is no time for derivatives."""
     nothing = np.zeros((len(residual), len(model.names)))
     return Sensitivity(residual, nothing, np.inf, np.inf, nothing)
 

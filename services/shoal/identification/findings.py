@@ -12,7 +12,7 @@ _ANOTHER = "look for another minimum (--method multi-start)"
 
 
 class Verdict(StrEnum):
-    """What may be made of an estimate, the worst last. Only the first three are answers."""
+    """Verdict on an estimate, the worst last. Only the first three are answers."""
 
     IDENTIFIED = "identified"
     PARTLY = "partly identified"

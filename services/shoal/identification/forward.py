@@ -71,7 +71,7 @@ class ForwardModel:
     failure: str = field(init=False, default="")
     """Why a simulation failed, if one did."""
     longest_fit: tuple[float, float, Array] = field(init=False, default=(0.0, np.inf, np.empty(0)))
-    """Of the longest part of the recordings that was fitted: its end [s], the best fitness on it, and the point."""
+    """Longest part of the recordings that was fitted: its end [s], the best fitness on it, and the point."""
 
     _placements: dict[str, AngleSensitivity] = field(init=False, default_factory=dict)
     _together: dict[tuple[str, ...], bool] = field(init=False, default_factory=dict)
@@ -110,7 +110,7 @@ class ForwardModel:
 
     @cached_property
     def rows(self) -> ResidualRows:
-        """What the rows of the residuals are, but for those of priors at their end."""
+        """Rows of the residuals, but for those of priors at their end."""
         return ResidualRows.of(self.measurement, (self.whole or self).measurement)
 
     def until(self, end: float) -> ForwardModel:
@@ -253,7 +253,7 @@ class ForwardModel:
         return found
 
     def _placement(self, points: Array, name: str) -> AngleSensitivity | None:
-        """How the channels of a recording follow from the angles of these points, where nothing else differs."""
+        """Channels of a recording as functions of the angles of these points, where nothing else differs."""
         known = self._placements.get(name)
         if known is not None and known.knows(points):
             return known
@@ -280,7 +280,7 @@ class ForwardModel:
         return self.scene.with_values({**stated, **{path: float(x[0]) for path, x in values.items()}})
 
     def _possible(self, points: Array, values: dict[str, Array], scene: Scene) -> npt.NDArray[np.bool_]:
-        """Which points are scenes at all, (points,): outside the box a mass may be negative.
+        """Mask of the points that are scenes at all, (points,): outside the box a mass may be negative.
 
         Inside it all are, but for numbers that limit each other, such as the moments of inertia of a body.
         """
@@ -395,7 +395,7 @@ class ForwardModel:
         return self.rows.estimated * self.rows.weight
 
     def steepness(self, residual: Array) -> Array:
-        """What a Gauss-Newton step multiplies the rows of the Jacobian by, and divides the residual by, (rows,)."""
+        """Factors of the rows of the Jacobian, and divisors of the residual, in a Gauss-Newton step, (rows,)."""
         if self.problem.loss == "squares":
             return np.ones_like(residual)
         data = len(self.rows.time)

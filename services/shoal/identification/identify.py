@@ -118,7 +118,7 @@ def _concluded(model: ForwardModel, outcome: Outcome, *how: Any) -> Estimate:
 
 
 def _fingerprint(model: ForwardModel, method: str, seed: int, tolerance: float | None) -> str:
-    """Of everything that the evaluations of a run depend on."""
+    """Hash of everything that the evaluations of a run depend on."""
     parts: list[Any] = [model.problem.model_dump_json(), model.scene.fingerprint, model.engine.name, method, seed]
     parts += [tolerance, versions(("numpy", "numba", "shoal"))]
     text = hashlib.sha256(repr(parts).encode())

@@ -20,11 +20,13 @@ _SHORTER = 0.75
 _LONGER = 0.93
 """... and each part over the next."""
 _SHORTEST = 0.2
+"""Of the record: where derivatives hold over no more, nothing is gained."""
 _HOLD = 1e-3
 """Relative difference of derivatives by two steps that hold."""
 _DAMPINGS = 10.0 ** np.arange(-2.0, 6.0)
 """Times the last damping: tried side by side."""
 _ITERATIONS = 20
+"""Steps on one part of the record, at most; it settles in a few."""
 _SETTLED = 1e-2
 """A fall of the squares by less than this times their mean is the end: by a hundredth of what noise leaves of a row."""
 _STEADY = 2.0

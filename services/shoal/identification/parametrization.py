@@ -66,18 +66,18 @@ class Parametrization:
 
     @cached_property
     def initial(self) -> npt.NDArray[np.bool_]:
-        """Which components are of the initial state, (components,), bool."""
+        """Components of the initial state, (components,), bool."""
         return np.array([path.startswith("initial.") for path in self.paths])
 
     @cached_property
     def turning(self) -> npt.NDArray[np.bool_]:
-        """Which components are angles, of which whole turns do not count, (components,), bool."""
+        """Components that are angles, of which whole turns do not count, (components,), bool."""
         measured = np.array([path in (f"{RESERVED}.tilt", f"{RESERVED}.mounting") for path in self.paths])
         return np.asarray(measured | self.initial & np.array([path.endswith(".angle") for path in self.paths]))
 
     @cached_property
     def rotations(self) -> dict[tuple[str | None, str], dict[int, int]]:
-        """Of each recording (None: all) and body the sought components of its rotation vector, by their number."""
+        """Sought components of the rotation vector of each recording (None: all) and body, by their number."""
         found: dict[tuple[str | None, str], dict[int, int]] = {}
         for k, (path, entry) in enumerate(zip(self.paths, self.entries.values(), strict=True)):
             if self.initial[k] and ".rotation." in path:
@@ -87,7 +87,7 @@ class Parametrization:
 
     @cached_property
     def proportional(self) -> npt.NDArray[np.bool_]:
-        """Which components the channels follow in proportion, with a single minimum, (components,), bool."""
+        """Components that the channels follow in proportion, with a single minimum, (components,), bool."""
         return np.array([path.startswith(RESERVED) and path.partition(".")[2] in PROPORTIONAL for path in self.paths])
 
     @cached_property
@@ -113,7 +113,7 @@ class Parametrization:
 
     @cached_property
     def logarithmic(self) -> npt.NDArray[np.bool_]:
-        """Which components stand by their logarithm, (components,), bool."""
+        """Components that stand by their logarithm, (components,), bool."""
         return np.array([entry.parameter.logarithmic for entry in self.entries.values()])
 
     def to_vector(self, values: Array) -> Array:
@@ -130,7 +130,7 @@ class Parametrization:
         return dict(zip(self.names, self.to_values(point).tolist(), strict=True))
 
     def named(self, points: Array, recording: str | None) -> dict[str, Array]:
-        """What expressions know at points (n, components): constants, and the parameters of a recording by name."""
+        """Names of expressions at points (n, components): constants, and the parameters of a recording by name."""
         values = self.to_values(points)
         found: dict[str, Array] = {name: np.full(len(points), x) for name, x in self.constants.items()}
         for k, entry in enumerate(self.entries.values()):

@@ -25,7 +25,7 @@ Place = Callable[[Array], Array]
 
 @dataclass(frozen=True)
 class AngleSensitivity:
-    """How channels depend on the angles at the start, while all other parameters stay what they are.
+    """Channels as functions of the angles at the start, all other parameters being constant.
 
     angles: components of the angles; base: the point that tells the others, (parameters,); rest: (channels,);
     along, across, turning: A, B and S, (angles, channels)
@@ -76,7 +76,7 @@ def placement(
     points: Array,
     place: Place,
 ) -> AngleSensitivity | None:
-    """Of points that differ in their angles alone, for a recording; None for other points, and other machines.
+    """Return that of points that differ in their angles alone, for a recording; None for others, and other machines.
 
     The machine has to be an open chain that stands at its stated angles, and to be seen by what is linear in its pose.
     """

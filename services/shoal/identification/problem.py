@@ -55,7 +55,7 @@ _POSITIVE = {
 
 
 class Prior(Record):
-    """What is known of a parameter beforehand: a normal distribution."""
+    """Prior knowledge of a parameter: a normal distribution."""
 
     mean: float
     std: Positive
@@ -101,7 +101,7 @@ class Parameter(Record):
 
     @property
     def begin(self) -> float:
-        """Where a search begins if nothing better is known: the start, else the middle of the range."""
+        """Default start of a search: the stated start, else the middle of the range."""
         if self.start is not None:
             return self.start
         return math.sqrt(self.lower) * math.sqrt(self.upper) if self.logarithmic else (self.lower + self.upper) / 2
@@ -118,7 +118,7 @@ def _apart(given: Any) -> Any:
 
 
 class Problem(Record):
-    """What to identify. `values` replace fields of the scene; `noise` is the standard deviation of a channel.
+    """Identification problem. `values` replace fields of the scene; `noise` is the standard deviation of a channel.
 
     source, or recordings by name: the data; several are fitted at once
     ties: path -> expression in parameters and constants, for fields that depend on parameters
@@ -203,7 +203,7 @@ class Problem(Record):
 
     @property
     def sources(self) -> dict[str, EngineSource | FileSource]:
-        """Where the data come from, by the name of the recording."""
+        """Sources of the data, by the name of the recording."""
         return self.recordings or ({"recording": self.source} if self.source is not None else {})
 
     def channels_of(self, source: EngineSource | FileSource) -> tuple[Channel, ...]:
@@ -279,7 +279,7 @@ class Problem(Record):
                     raise InputError(f"{where}: {bound:g} cannot be: {error}{possible}") from None
 
     def _fields(self, scene: Scene, name: str, value: float) -> dict[str, float]:
-        """What a value of a parameter sets in the scene, by path, with its ties; the others are at their starts."""
+        """Fields that a value of a parameter sets, by path, ties included; the others are at their starts."""
         known = {other: parameter.begin for other, parameter in self.parameters.items()} | {name: value}
         known |= {constant: float(scene.value(path)) for constant, path in self.constants.items()}
         tied = {path: text for path, text in self.ties.items() if name in expression.names(text)}

@@ -22,7 +22,7 @@ from shoal.trajectory import Array
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What an answer shows of its parameters, before the verdict.
+    """Parameters, valley and profiles near an answer, before the verdict.
 
     outcome: without the minima in the valley of the answer; ends: the answer and those minima: the intervals hold all
     curved: parameters whose intervals are those of their profiles

@@ -33,7 +33,7 @@ SENSORS = {"acceleration": "m/s^2", "rate": "rad/s", "force": "N", "torque": "N 
 
 
 def kind_of(channel: Channel) -> str:
-    """What a channel measures: position, angle, acceleration, rate, force, torque or strain."""
+    """Kind of quantity that a channel measures: position, angle, acceleration, rate, force, torque or strain."""
     return KINDS.get(channel.quantity, channel.quantity)
 
 

@@ -32,7 +32,9 @@ from shoal.trajectory import Array
 
 ABOUT = ("answer", "start")
 _DURATIONS = (0.25, 0.5, 1.0, 1.5, 2.0)
+"""Durations that a plan compares, as multiples of the present one."""
 _RATES = (0.25, 0.5, 1.0, 2.0)
+"""Sampling rates that a plan compares, likewise."""
 _COURSE = 40
 _ENOUGH = 0.1
 """Relative difference of the sensitivities by two steps: who compares sensors wants no more digits."""
@@ -190,7 +192,7 @@ def _bundle(model: ForwardModel, point: Array, aim: Aim, present: int, begins: b
 
 
 def _moved(model: ForwardModel, point: Array, rows: int) -> tuple[Array, list[str]]:
-    """What is taken as known and is not quite changes of the rows over the noise, (n, rows), and what it is."""
+    """Change of the rows over the noise by uncertain inputs, (n, rows), and their description."""
     name, noise = next(iter(model.measurement.recordings)), model.rows.noise
     predicted = {name: model.observe(point[None], name)[0]}
     signals, fields = taken_as_given(model, point, predicted, np.full(rows, noise))
@@ -199,7 +201,7 @@ def _moved(model: ForwardModel, point: Array, rows: int) -> tuple[Array, list[st
 
 
 def _aim(model: ForwardModel, parameter: str | None) -> Aim:
-    """What is to be known better. Raises InputError."""
+    """Return the aim of a design. Raises InputError."""
     if parameter is not None and parameter not in model.names:
         raise InputError(f"parameter: no parameter {parameter!r}; there are {', '.join(model.names)}")
     return Aim(model.names, model.upper - model.lower, parameter)
@@ -225,7 +227,7 @@ def _possible(problem: Problem, scene: Scene, sensors: list[Sensor], at: Mapping
 
 
 def _model(problem: Problem, scene: Scene, channels: tuple[Channel, ...], noise: Array, times: Array) -> ForwardModel:
-    """Of the first recording, with other channels of some noise at other times, of which nothing was measured yet."""
+    """Return the model of the first recording with other channels, noise and times, nothing measured yet."""
     name, source = next(iter(problem.sources.items()))
     # Standard deviations are given in the parameters' own units, but for those that are stated to be logarithms.
     scales = {n: p.model_copy(update={"scale": "linear"}) for n, p in problem.parameters.items() if p.scale == "auto"}

@@ -13,7 +13,7 @@ from shoal.trajectory import Array
 
 @dataclass(frozen=True)
 class Precision:
-    """What a measurement would tell: standard deviation of each parameter (of its logarithm where that is sought).
+    """Precision of a measurement: standard deviation of each parameter (of its logarithm where that is sought).
 
     std: inf where nothing is known, (parameters,); the others relative to the ranges between the bounds
     a: root of the mean variance; d: geometric mean over the axes of the ellipsoid; unknown: directions left open
@@ -77,7 +77,7 @@ class Bundle:
 
 
 def precision(jacobian: Array, span: Array, error: Array | None = None, moved: Array | None = None) -> Precision:
-    """What rows of sensitivities over the noise tell, (rows, parameters), for ranges `span` (parameters,).
+    """Precision by rows of sensitivities over the noise, (rows, parameters), for ranges `span` (parameters,).
 
     error: by how much they may be off, (rows, parameters); what is no larger, along some direction, tells nothing
     moved: of the rows over the noise, by independent standard deviations of what is taken as known, (n, rows): a fit
@@ -102,7 +102,7 @@ def precision(jacobian: Array, span: Array, error: Array | None = None, moved: A
 
 @dataclass(frozen=True)
 class Aim:
-    """What is to be sharpened: a parameter by its name, or None for the weakest, whichever that is.
+    """Aim of a design: a parameter by its name, or None for the weakest, whichever that is.
 
     names: of the parameters; span: their ranges between the bounds, (parameters,)
     """

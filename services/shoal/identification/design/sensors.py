@@ -100,7 +100,7 @@ class Sensor:
         return tuple(Channel(quantity=quantity, **where) for quantity in quantities[self.quantity])
 
     def to_json(self) -> dict[str, Any]:
-        """Where and what, as `shoal design --json` tells it."""
+        """Place and quantity, as `shoal design --json` prints them."""
         place = {"marker": None if self.in_joint else self.name, "joint": self.name if self.in_joint else None}
         where = {"to": self.to, "body": self.body, "point": self.point, "tilt": self.tilt, "height": self.height}
         return {**place, **where, **({"side": self.side} if self.in_space else {}), "quantity": self.quantity}

@@ -75,7 +75,7 @@ class Hypothesis:
 
 @dataclass(frozen=True, eq=False)
 class ScoreTest:
-    """What a score test at an answer needs, of its rows.
+    """Score test at an answer, by its rows.
 
     residual: (rows,), that of a finer mesh and a fuller theory where these are known; basis: orthonormal columns (rows,
     k) of what the sought parameters follow; blocks, noise: the series of the residuals; given: what is taken as known
@@ -239,7 +239,7 @@ def table(
 
 
 def independent(units: Array) -> float:
-    """How many independent tests those along unit effects (tests, rows) are worth (Li and Ji 2005)."""
+    """Effective number of independent tests along unit effects (tests, rows) (Li and Ji 2005)."""
     values = np.abs(np.linalg.eigvalsh(units @ units.T))
     values = np.where(values < ROUND_OFF * len(units), 0.0, values + ROUND_OFF)
     return float(np.sum((values >= 1.0) + (values - np.floor(values))))
@@ -284,7 +284,7 @@ class Suspect:
         return f"the {self.words}: {self.change} would lower {misfit}"
 
     def cost(self, rows: int) -> float:
-        """What it leaves of so many rows, squared, and larger by what further numbers fit by chance."""
+        """Squared misfit, penalised for further numbers, which fit by chance, by Schwarz's criterion over the rows."""
         return self.after**2 * penalty(self.numbers, rows)
 
     def equals(self, best: Suspect, rows: int) -> bool:

@@ -38,7 +38,7 @@ _OTHERS = 3
 
 @dataclass(frozen=True)
 class Judgement:
-    """What the diagnostics found about an answer.
+    """Findings, suspects and refits of the diagnostics of an answer.
 
     suspects: what was taken as known and would lower a misfit if it were freed, the best first
     refits: fits with what would explain a misfit that is not held against the model; the intervals hold them too

@@ -70,7 +70,7 @@ def beyond_noise(
 
 
 def _limited(parameters: Mapping[str, Value], part: str) -> str:
-    """Whose intervals a part of the model's error widens, `correction` or `theory`."""
+    """Names of parameters whose intervals a part of the model's error widens, `correction` or `theory`."""
     parts = {name: abs(getattr(value, part) or 0.0) for name, value in parameters.items()}
     return ", ".join(n for n, v in parameters.items() if parts[n] > NOTICED * (v.upper - v.lower) / 2)
 

@@ -62,7 +62,7 @@ class ResidualTests:
 
     @classmethod
     def not_made(cls, model: ForwardModel) -> ResidualTests:
-        """Of an answer whose residual is not known: nothing but the data is."""
+        """Return empty tests, where nothing but the data is known."""
         stated = model.rows.noise
         noise, size = np.nan if stated is None else stated, np.nan
         return cls(size, noise, stated is not None, model.rows.signal, 0.0, np.nan, np.nan, 0, len(model.rows.time))
@@ -74,7 +74,7 @@ class ResidualTests:
 
     @property
     def explained(self) -> float:
-        """What noise and mesh explain."""
+        """Size of a residual that noise and mesh explain."""
         return max(float(np.hypot(self.noise, self.mesh)), 1e-300)
 
     @property
@@ -143,7 +143,7 @@ class ResidualTests:
 
     @property
     def correlation(self) -> str:
-        """What the residuals' correlation shows, in words."""
+        """Description of the residuals' correlation."""
         if self.size < ROUND_OFF * self.signal:
             return "that of round-off"
         if not self.white:

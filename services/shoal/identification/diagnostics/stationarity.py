@@ -39,7 +39,7 @@ class Downhill:
 
 
 def downhill(model: ForwardModel, point: Array, seen: Sensitivity) -> Downhill | None:
-    """Where a Gauss-Newton step leads from a point, if it is a significant way down; else None. Not counted.
+    """Return the end of a Gauss-Newton step from a point if it is significantly lower; else None. Not counted.
 
     seen: residuals and derivatives there. Parameters stay within their bounds, and directions that the data leave open
     as they are. The model is run along the step: a promise of derivatives that does not come true is none.
@@ -62,7 +62,7 @@ def downhill(model: ForwardModel, point: Array, seen: Sensitivity) -> Downhill |
 
 
 def sentence(model: ForwardModel, point: Array, better: Downhill) -> str:
-    """What the step does, in words: the parameter that it moves most, by its size, stands for all."""
+    """Description of the step in words, by the parameter that it moves most."""
     moved = int(np.argmax(np.abs(better.point - point) / model.sizes(point)))
     old, new = (model.parameters.to_values(place)[moved] for place in (point, better.point))
     return (

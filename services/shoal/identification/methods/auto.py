@@ -140,7 +140,7 @@ def _others(model: ForwardModel, point: Array, free: npt.NDArray[np.intp]) -> tu
 
 
 def _wide(model: ForwardModel, point: Array) -> npt.NDArray[np.bool_]:
-    """Whose bounds are far away beside their values, of those sought as they are."""
+    """Parameters sought as they are whose bounds are far away beside their values."""
     size = np.abs(point)
     far = model.upper - model.lower > _FACTOR**2 * size
     return np.asarray(~model.parameters.logarithmic & far & (size > 0.0))

@@ -14,6 +14,7 @@ from shoal.trajectory import Array
 CONTRACTED = 1e-3
 """The search is over when the population fills no more than this fraction of each range."""
 GENERATIONS = 200
+"""Generations at most; the search mostly ends by CONTRACTED before."""
 RUNS = 4
 """Of CMA-ES, each with twice the population of the one before."""
 _HUGE = 1e30

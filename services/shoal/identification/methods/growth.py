@@ -16,7 +16,7 @@ _PARTS = 10
 
 
 def growth(model: ForwardModel, jacobian: Array) -> float:
-    """How many fold a deviation grows over the record, from a Jacobian (rows, parameters) of the residuals.
+    """Growth factor of a deviation over the record, from a Jacobian (rows, parameters) of the residuals.
 
     The largest singular value of d(channels)/d(initial state), per sample, in the worst tenth of the record over that
     in the first; where no initial state is sought, that of the parameters relative to their range. The number of a
@@ -37,6 +37,6 @@ def growth(model: ForwardModel, jacobian: Array) -> float:
 
 
 def swings(model: ForwardModel) -> int:
-    """How often a channel passes its mean, the most of all."""
+    """Largest number of mean crossings of a channel."""
     signals = [signal[np.isfinite(signal)] for r in model.measurement.recordings.values() for signal in r.values.T]
     return max(int(np.sum(np.diff(np.sign(s - np.mean(s))) != 0)) for s in signals if s.size)

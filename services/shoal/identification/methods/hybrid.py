@@ -11,6 +11,7 @@ from shoal.identification.methods.swarms import school
 from shoal.swarm import Iafsa
 
 ITERATIONS = 15
+"""Iterations of the swarm before the descents, which end the search: enough to find their basins."""
 
 
 def hybrid(model: ForwardModel, rng: np.random.Generator, progress: Progress) -> Outcome:

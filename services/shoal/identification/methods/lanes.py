@@ -23,11 +23,13 @@ from shoal.trajectory import Array
 T = TypeVar("T")
 
 _ITERATIONS = 60
+"""Steps of a descent, at most."""
 _ROUNDS = 5
 """Of so many iterations, at most, where a descent that has not converged is followed to its end."""
 _SMALL_GAIN = 1e-8
 """A step that promises to lower the fitness by less than this fraction is the end."""
 UNDAMPED, _LARGE_DAMPING = 1e-6, 1e12
+"""Least damping, and that from which on a step is so short that there is no descent (Marquardt 1963)."""
 DESCENTS = 8
 """Descents from the best starts, side by side: with their differences they fill the lanes of a call."""
 FEW = 3
@@ -160,7 +162,7 @@ def difference_at(model: ForwardModel, point: Array) -> Array:
 
 
 def _together(model: ForwardModel) -> int:
-    """How many points with their neighbours fit into one tile, where lanes share their steps; 0 where they do not."""
+    """Number of points that fit with their neighbours into one tile, where lanes share their steps; 0 where not."""
     integrator = model.scene.solver.integrator
     shared = integrator == "auto" or facts(integrator).adaptive
     return max(1, len(WIDE) // (1 + len(model.names))) if shared else 0
@@ -252,7 +254,7 @@ class Search:
         return self.damping > _LARGE_DAMPING
 
     def ask(self) -> Array | None:
-        """Where to look next, (parameters,), or None at the end."""
+        """Return the next trial point, (parameters,), or None at the end."""
         if self.converged or not np.isfinite(self.cost):
             return None
         model = self.model
@@ -286,7 +288,7 @@ class Search:
         self.rows.append((len(self.rows), self.fitness, cost / self.model.rows.samples))
 
     def descent(self) -> Descent:
-        """What came out."""
+        """Result of the descent."""
         return Descent(self.point, self.residual, self.jacobian, self.fitness, self.rows, self.converged)
 
     def _step(self, damping: float) -> Array:
@@ -346,7 +348,7 @@ def squares(residual: Array) -> float:
 
 
 def differing(model: ForwardModel, one: Array, other: Array) -> Array:
-    """Which parameters of two minima are different, (parameters,).
+    """Mask of the parameters in which two minima differ, (parameters,).
 
     By a part of their range, or where that is wide beside them of ten times their size: bounds may be as far away as
     one likes. Angles that differ by whole turns are the same, and so are rotation vectors.

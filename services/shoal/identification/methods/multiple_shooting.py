@@ -33,12 +33,12 @@ SEGMENT = 0.5
 _SAMPLES = 5
 """Of a segment, at least."""
 _ITERATIONS = 15
+"""Steps at most until the segments meet."""
 _MEETING = 1e-5
 """Where no unknown moves more [rad, rad/s, fractions of a range], single shooting takes over."""
 _FASTEST = 1e3
 """Bound of the rates at the begins of segments [rad/s]."""
 _PREFIX = "state-"
-_WINDING = 2 * np.pi
 Places = npt.NDArray[np.intp]
 
 
@@ -83,7 +83,7 @@ class Segments:
 
     @cached_property
     def sought(self) -> dict[int, int]:
-        """Which component of the problem's vector a component of the first state is, where it is sought."""
+        """Components of the problem's vector that are components of the first state, where it is sought."""
         name = next(iter(self.model.measurement.recordings))
         found = {**self.model.parameters.indices(name, ".angle"), **self.model.parameters.indices(name, ".rate")}
         paths = _state_paths(self.model.scene)
@@ -183,9 +183,9 @@ class Segments:
         """The states with whole turns added so that each begins near where the one before ends."""
         states = states.copy()
         for k, end in enumerate(self.ends):
-            turns = np.round((seen[k, end, -states.shape[1] :: 2] - states[k + 1, ::2]) / _WINDING)
-            states[k + 1 :, ::2] += _WINDING * turns
-            seen[k + 1 :, :, -states.shape[1] :: 2] += _WINDING * turns
+            turns = np.round((seen[k, end, -states.shape[1] :: 2] - states[k + 1, ::2]) / (2 * np.pi))
+            states[k + 1 :, ::2] += 2 * np.pi * turns
+            seen[k + 1 :, :, -states.shape[1] :: 2] += 2 * np.pi * turns
         return states
 
     def _window(self, k: int) -> ForwardModel:

@@ -16,7 +16,7 @@ from shoal.identification.forward import ForwardModel, Progress
 from shoal.identification.methods.lanes import descend_many, distance, distinct, history, kept_apart, squares
 from shoal.identification.methods.least_squares import differentiate
 from shoal.identification.methods.outcome import Outcome
-from shoal.identification.methods.starts import starting_points
+from shoal.identification.methods.starts import GAIN, starting_points
 from shoal.trajectory import Array
 
 FIRST, _PART = 0.5, 0.1
@@ -31,8 +31,6 @@ _NOTICED = 5.0
 """Times the deviation of the fit."""
 _ITERATIONS = 8
 """Steps on each horizon."""
-_GAIN = 1e-3
-"""A step that promises to lower the squares by less than this fraction ends a horizon."""
 _HOPELESS = 25.0
 """Times the fitness of the best branch on the same horizon: a branch that is worse is dropped."""
 TRUST = 0.3
@@ -95,7 +93,7 @@ def fit(model: ForwardModel, start: Array) -> Branch:
         step = np.linalg.solve(normal / scale / scale[:, None], gradient / scale) / scale
         trial = np.clip(point - step, model.lower, model.upper)
         predicted = cost - squares(residual + jacobian @ (trial - point))
-        if predicted < _GAIN * cost:
+        if predicted < GAIN * cost:
             break
         there = differentiate(model, trial)
         if squares(there[0]) < cost:

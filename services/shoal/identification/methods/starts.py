@@ -10,7 +10,7 @@ import numpy as np
 
 from shoal.identification.conventions import ROUND_OFF
 from shoal.identification.forward import ForwardModel
-from shoal.identification.methods.lanes import DESCENTS, kept_apart
+from shoal.identification.methods.lanes import DESCENTS, ENDS_APART, kept_apart
 from shoal.mechanics.numerics.levenberg_marquardt import levenberg_marquardt
 from shoal.mechanics.numerics.tile import Index
 from shoal.trajectory import Array
@@ -18,12 +18,12 @@ from shoal.trajectory import Array
 _CANDIDATES = 16
 """Poses that are tried for each angle."""
 _ITERATIONS = 30
-_GAIN = 1e-3
+"""Steps of the search for poses, at most."""
+GAIN = 1e-3
 """Poses are found where a step promises to lower the squared error by less than this part; an error below this [m] that
 does not halve is round-off."""
 _FIRST_SAMPLES = 5
-_SAME = 1e-3
-"""Two poses are the same if no parameter differs by more than this fraction of its range."""
+"""Samples by whose slope rates start: a parabola through them leaves two for the noise."""
 
 
 def starting_points(model: ForwardModel) -> Array:
@@ -107,7 +107,7 @@ def _poses(model: ForwardModel, name: str, middle: Array, angles: list[int], pos
         return _pose_error(model, name, placed, angles, pose)
 
     found = levenberg_marquardt(
-        evaluate, damped_steps, points[:, angles], gain=_GAIN, round_off=ROUND_OFF, most=_ITERATIONS,
+        evaluate, damped_steps, points[:, angles], gain=GAIN, round_off=ROUND_OFF, most=_ITERATIONS,
         move=lambda at, step: np.clip(at + step, model.lower[angles], model.upper[angles]),
     )  # fmt: skip
     points[:, angles] = found.points
@@ -144,7 +144,7 @@ def _distinct(model: ForwardModel, points: Array, cost: Array, angles: list[int]
     chosen = np.flatnonzero(near & inside) if np.any(near & inside) else np.array([np.argmin(cost)])
     span = (model.upper - model.lower)[angles]
     best_first = points[chosen[np.argsort(cost[chosen])]]
-    return np.array(kept_apart(best_first, lambda a, b: np.max(np.abs((a - b)[angles]) / span) > _SAME))
+    return np.array(kept_apart(best_first, lambda a, b: np.max(np.abs((a - b)[angles]) / span) > ENDS_APART))
 
 
 def _pose_error(model: ForwardModel, name: str, points: Array, angles: list[int], pose: Array) -> tuple[Array, Array]:

@@ -80,7 +80,7 @@ class Recording:
 
     @property
     def things(self) -> int:
-        """How many things are observed: positions (x and y count as one), angles, and what sensors show."""
+        """Number of observed things: positions (x and y count as one), angles, and what sensors show."""
         return len({(c.place, c.to, "position" if c.is_position else c.quantity) for c in self.channels})
 
     def until(self, end: float) -> Recording:
@@ -125,7 +125,7 @@ class Measurement:
 
     @property
     def origin(self) -> str:
-        """Where the data come from."""
+        """Origin of the data."""
         many = len(self.recordings) > 1
         return "; ".join(f"{name}: {r.origin}" if many else r.origin for name, r in self.recordings.items())
 
@@ -144,6 +144,7 @@ class Measurement:
 
 
 _ORDER = 4
+"""Order of the differences: they keep 16 sin^4(pi f) of a motion of f periods a sample."""
 
 
 def noise_of(recording: Recording) -> Array:

@@ -15,7 +15,7 @@ from shoal.trajectory import Array, Trajectory
 
 
 class Camera(NamedTuple):
-    """Where positions are seen from: at rotation(-tilt) (X - [x, y]) / scale, z at z / scale; numbers or (lanes,).
+    """Camera that sees positions: at rotation(-tilt) (X - [x, y]) / scale, z at z / scale; numbers or (lanes,).
 
     mounting and biases: of inertial sensors, see `Clocked`
     """

@@ -35,6 +35,7 @@ _PARTS = 50.0
 _UPRIGHT = 1e-3
 """Of gravity: across the axis of a hinge, less swings nothing."""
 _LENGTHS = {"cm": 100.0, "mm": 1000.0, "um": 1e6}
+"""Units of length, by their number in a metre."""
 
 
 @dataclass(frozen=True)
@@ -151,7 +152,7 @@ def _pace(times: Array, signal: Array) -> float | None:
 
 
 def _rate(times: Array, signal: Array, least: float) -> float:
-    """How fast a signal changes at most, but for a twentieth of the time, over steps of at least so many seconds.
+    """Largest rate of a signal, but for a twentieth of the time, over steps of at least a given time [s].
 
     Of three samples in a row the middle one by size counts, so that single outliers do not.
     """

@@ -141,7 +141,7 @@ def _begin(source: FileSource, times: Array) -> float:
 
 
 def _window(source: FileSource, times: Array, begin: float, path: Path) -> Mask:
-    """Which rows are in the window, (rows,), bool. Raises InputError."""
+    """Mask of the rows in the window, (rows,), bool. Raises InputError."""
     stop = np.inf if source.duration is None else begin + source.duration
     inside: Mask = (times >= begin - 1e-9) & (times <= stop + 1e-9)
     count = len(np.flatnonzero(inside)[:: source.every])
@@ -249,7 +249,7 @@ def _findings(times: Array, values: Array, channels: tuple[Channel, ...]) -> lis
 
 
 def _held(times: Array, signal: Array) -> list[str]:
-    """Where a signal that changes with every sample stands still to the last digit, as a lost marker is written."""
+    """Notes of stretches where a signal is constant to the last digit, as a lost marker is written."""
     known = np.isfinite(signal)
     t, x = times[known], signal[known]
     ends = np.flatnonzero(np.append(np.diff(x) != 0.0, True))
@@ -266,7 +266,7 @@ def _held(times: Array, signal: Array) -> list[str]:
 
 
 def _outliers(times: Array, signal: Array) -> int:
-    """How many samples stand alone, by the cubic through their four neighbours; none where times are uneven.
+    """Number of isolated outliers, by the cubic through four neighbours; none where times are uneven.
 
     A kink or a jump of the motion looks like one too, but is not mended by another value of that sample.
     """

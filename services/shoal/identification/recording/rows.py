@@ -55,7 +55,7 @@ class ResidualRows:
 
     @cached_property
     def weight(self) -> Array:
-        """What a deviation is multiplied by, (rows,): channels count by their noise, relative to its geometric mean.
+        """Weight of each row, (rows,): channels count by their noise, relative to its geometric mean.
 
         Where it is not stated all count alike, but for channels of different units, of which a metre and a radian are
         not alike: these count by the noise that the data show.
@@ -96,12 +96,12 @@ class ResidualRows:
 
     @cached_property
     def samples(self) -> int:
-        """How many instants were measured."""
+        """Number of measured instants."""
         return sum(int(np.any(np.isfinite(r.values), axis=1).sum()) for r in self.measurement.recordings.values())
 
     @cached_property
     def things(self) -> float:
-        """How many positions and angles an instant shows, on average."""
+        """Mean number of positions and angles that an instant shows."""
         runs = self.measurement.recordings.values()
         return sum(r.things * len(r.times) for r in runs) / sum(len(r.times) for r in runs)
 

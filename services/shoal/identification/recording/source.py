@@ -120,14 +120,14 @@ class Channel(Record):
 
     @property
     def name(self) -> str:
-        """What is measured, in words."""
+        """Measured quantity, in words."""
         height = f" at height {self.height:g} m" if self.height else ""
         height += f" to the side by {self.side:g} m" if self.side else ""
         return f"{self.quantity} of {self.place}{f' against {self.to}' if self.to else ''}{height}"
 
     @property
     def kind(self) -> str:
-        """What is measured in a place, as one word."""
+        """Quantity that is measured in a place, as one word."""
         height = f"_at_{self.height:g}" if self.height or self.side else ""
         height += f"_{self.side:g}" if self.side else ""
         return self.quantity + (f"_against_{self.to}" if self.to else "") + height
@@ -185,7 +185,7 @@ Windows = Annotated[list[tuple[float, float]], BeforeValidator(_windows), AfterV
 
 
 class Clocked(Record):
-    """What a recording of any kind says: the motion's time is recorded time / clock + delay [s] after its start.
+    """Statements of a recording of any kind: the motion's time is recorded time / clock + delay [s] after its start.
 
     So `clock` is how many seconds the recording's clock shows in one second: 1.26 is a clock that is fast by 26 %.
     A marker at X [m] is recorded at rotation(-tilt) (X - [x, y]) / scale, its z at z / scale, angles less `tilt`:
@@ -217,7 +217,7 @@ class Clocked(Record):
     hold_out: Windows = []
 
     def as_stated(self) -> Clocked:
-        """What it says of clock, camera and scene, without where the data come from."""
+        """Its clock, camera and scene, without the origin of the data."""
         return Clocked(**{name: getattr(self, name) for name in Clocked.model_fields})
 
 

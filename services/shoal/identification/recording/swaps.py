@@ -35,7 +35,7 @@ def mend(times: Array, tracks: Mapping[str, Array]) -> tuple[dict[str, Array], l
 
 
 def _exchanged_samples(times: Array, one: Array, other: Array) -> Array:
-    """Which samples are exchanged between two paths, (samples,), bool; those that show one of them go with both sides.
+    """Mask of samples exchanged between two paths, (samples,), bool; where one is missing both neighbours decide.
 
     What is unknown is whether sample k is exchanged against the one before it. Distances, not their squares, are
     added: by the triangle inequality no outlier of a single marker is then explained by an exchange.
@@ -93,7 +93,7 @@ def _cheapest(costs: Array, penalty: float) -> list[int]:
 
 
 def _spans(wrong: Array) -> str:
-    """Where samples are exchanged, in words."""
+    """Description of the exchanged samples, in words."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], wrong, [False]]).astype(int)))
     spans = [f"{a}" if b - a == 1 else f"{a} to {b - 1}" for a, b in edges.reshape(-1, 2).tolist()]
     more = f" and {len(spans) - _LISTED} more places" if len(spans) > _LISTED else ""

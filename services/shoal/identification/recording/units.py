@@ -83,7 +83,7 @@ def squared(unit: str) -> str:
 def with_units(
     source: FileSource, channels: tuple[Channel, ...], units: Units
 ) -> tuple[FileSource, tuple[Channel, ...], list[str]]:
-    """What a recording states, completed by the units of its table, and a note for each that they contradict.
+    """Statements of a recording, completed by the units of its table, and a note for each that they contradict.
 
     What is stated wins. Raises InputError for a unit that is not known, or that of another kind of quantity.
     """

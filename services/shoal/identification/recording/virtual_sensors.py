@@ -154,7 +154,7 @@ def _by_course(
 def _of_lane(
     one: Felt, scene: Scene, channels: tuple[Channel, ...], numbers: list[int], joints: tuple[str, ...], turned: Array
 ) -> dict[int, Array]:
-    """What the sensors on one lane show, those that are turned by some angles, (samples, angles or 1) each."""
+    """Signals of the sensors on one lane, turned by given angles, (samples, angles or 1) each."""
     from shoal.mechanics.analysis.reactions_along import reactions_along  # slow to import
 
     reactions = reactions_along(one, joints) if joints else {}
@@ -187,7 +187,7 @@ def _course(trajectory: Trajectory, scene: Scene) -> Course:
 
 
 def _strain(trajectory: Trajectory, scene: Scene, channel: Channel) -> Array:
-    """Of a gauge: how its ends move apart, and at a height turn, over its length, (samples, lanes)."""
+    """Strain of a gauge: relative motion and rotation of its ends over its length, (samples, lanes)."""
     begin, end = _ends(scene, scene.markers[channel.marker])
     one, other = (trajectory.markers.index(f"{prefix}{channel.marker}") for prefix in (_BEFORE, _BEHIND))
     apart = np.linalg.norm(trajectory.points[:, other] - trajectory.points[:, one], axis=1)

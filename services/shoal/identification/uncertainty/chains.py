@@ -37,7 +37,7 @@ class Independent:
 
     @classmethod
     def of(cls, draws: Array, before: Independent, weights: Array | None = None) -> Independent:
-        """Of the mean and the covariance of draws (draws, parameters); that before where they have none."""
+        """Return that of the mean and covariance of draws (draws, parameters); the one before where they have none."""
         covariance = np.atleast_2d(np.cov(draws.T, aweights=weights))
         try:
             return cls(np.average(draws, axis=0, weights=weights), np.asarray(np.linalg.cholesky(covariance)))
@@ -51,7 +51,7 @@ class Independent:
         return np.asarray(self.centre + (normal * wide) @ self.root.T)
 
     def log_density(self, points: Array) -> Array:
-        """Of points (count, parameters), but for a constant."""
+        """Logarithm of the density at points (count, parameters), but for a constant."""
         away = np.sum(((points - self.centre) @ self.inverse.T) ** 2, axis=1)
         return np.asarray(-(_FREEDOM + len(self.centre)) / 2 * np.log1p(away / _FREEDOM))
 
@@ -62,7 +62,7 @@ class Independent:
 
 
 def weights(logarithms: Array) -> Array:
-    """Of draws, which add up to 1, from their logarithms; all of the first draw where none can be simulated."""
+    """Weights of draws, which add up to 1, from their logarithms; the first has all where none can be simulated."""
     most = float(np.max(logarithms))
     if not np.isfinite(most):
         return np.asarray(np.eye(len(logarithms))[0])
@@ -82,7 +82,7 @@ def possible(density: LogDensity, near: Independent, count: int, rng: np.random.
 
 
 def sampler(density: LogDensity, near: Independent, walkers: int, alike: bool) -> EnsembleSampler:
-    """Of so many walkers; near: what independent draws are made from; alike: whether the density is like that."""
+    """Return a sampler of walkers; near: distribution of independent draws; alike: whether the density is like that."""
     from emcee import EnsembleSampler
     from emcee.moves import DEMove, MHMove, StretchMove
 
@@ -113,7 +113,7 @@ TAILS = (0.05, 0.95)
 
 
 def r_hat(draws: Array) -> float:
-    """Of draws (ensembles, steps, walkers): spread of all over that within half an ensemble's run, at least about 1.
+    """R-hat of draws (ensembles, steps, walkers): spread of all over that within half a run, at least about 1.
 
     The larger one of places and of widths, by ranks.
     """
@@ -182,7 +182,7 @@ def _scores(draws: Array) -> Array:
 
 
 def _autocovariance(chains: Array) -> Array:
-    """Of every row, (rows, steps), over the number of steps."""
+    """Autocovariance of every row, (rows, steps), over the number of steps."""
     steps = chains.shape[1]
     room = next_fast_len(2 * steps)
     found = rfft(chains - chains.mean(axis=1, keepdims=True), room, axis=1)

@@ -18,7 +18,9 @@ from shoal.identification.uncertainty.chances import above_chi_square
 from shoal.trajectory import Array
 
 _ROUNDS = 60
+"""Iterations of the moment equations, at most."""
 _SETTLED = 1e-5
+"""Change of a correlation that ends them."""
 _LONGEST = 1.0 / 3.0
 """Correlation that outlasts this part of a recording cannot be distinguished from a change of the parameters."""
 
@@ -46,7 +48,7 @@ class Noise:
     freedom: float
 
     def independent(self, count: int) -> float:
-        """How many independent samples so many are worth."""
+        """Effective number of independent samples among `count`."""
         return count * (1.0 - self.rho) / (1.0 + self.rho)
 
 

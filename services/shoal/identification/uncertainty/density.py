@@ -41,7 +41,7 @@ class Density:
         self.evaluations = self.failed = 0
 
     def __call__(self, points: Array) -> Array:
-        """Of points (count, parameters); -inf outside the bounds and where nothing can be simulated."""
+        """Log density at points (count, parameters); -inf outside the bounds and where nothing can be simulated."""
         found = np.full(len(points), -np.inf)
         inside = np.flatnonzero(np.all((points >= self.lower) & (points <= self.upper), axis=1))
         if inside.size:
@@ -81,7 +81,7 @@ def density(model: ForwardModel, point: Array, at: Linearisation, blocks: list[B
 
 
 def _freedom(parts: Array, at: Linearisation, blocks: list[Block]) -> float:
-    """Of the whole covariance, from the shares (blocks, p, p) whose noise is not stated (Satterthwaite 1946)."""
+    """Degrees of freedom of the covariance, from shares (blocks, p, p) of unstated noise (Satterthwaite 1946)."""
     stated = [b.known or (b.stated > 0 and n.variance <= b.stated**2) for b, n in zip(blocks, at.noise, strict=False)]
     stated += [False] * (len(at.noise) - len(blocks))
     shares = np.einsum("bij,ji->b", parts, np.linalg.inv(parts.sum(axis=0))) / parts.shape[1]
@@ -94,6 +94,6 @@ def _quantile(freedom: float) -> float:
 
 
 def _root(matrix: Array, power: float) -> Array:
-    """Of a symmetric positive matrix."""
+    """Power of a symmetric positive matrix."""
     values, vectors = np.linalg.eigh(matrix)
     return np.asarray((vectors * np.maximum(values, 1e-300) ** power) @ vectors.T)

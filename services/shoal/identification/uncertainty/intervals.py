@@ -61,7 +61,7 @@ _FEWEST = 3
 
 
 def parameters(model: ForwardModel, point: Array, at: Linearisation, correction: Corrections) -> dict[str, Value]:
-    """Of every parameter by its name, in its own units."""
+    """Return the value of every parameter by its name, in its own units."""
     found = {}
     for k, name in enumerate(model.names):
         about = spread(lambda p, k=k: float(p[k]), point, at)  # type: ignore[misc]
@@ -78,7 +78,7 @@ def parameters(model: ForwardModel, point: Array, at: Linearisation, correction:
 def quantities(
     model: ForwardModel, point: Array, at: Linearisation, correction: Corrections, curved: list[int]
 ) -> dict[str, Value]:
-    """Of every quantity by its name; of those that depend on parameters `curved` none is identifiable."""
+    """Return the value of every quantity by its name; none that depends on parameters `curved` is identifiable."""
     found, entries = {}, list(model.parameters.entries.values())
     doubtful = {entries[k].key for k in curved}
     for name, text in model.problem.quantities.items():
@@ -114,11 +114,11 @@ class Refit:
     jacobian: Array
 
     def values(self) -> dict[str, Value]:
-        """Of every parameter, what was freed among them."""
+        """Values of all parameters, freed numbers included."""
         return parameters(self.model, self.point, self._at, Corrections(None, None))
 
     def quantities(self) -> dict[str, Value]:
-        """Of every quantity."""
+        """Values of all quantities."""
         return quantities(self.model, self.point, self._at, Corrections(None, None), [])
 
     @cached_property
@@ -150,7 +150,7 @@ def _narrower(model: ForwardModel, k: int, known: Value) -> bool:
 
 
 def covariance(model: ForwardModel, point: Array, at: Linearisation) -> Array:
-    """Of the values, (parameters, parameters): d exp(p) = exp(p) dp for those that are sought by their logarithm."""
+    """Covariance of the values, (parameters, parameters): d exp(p) = exp(p) dp for logarithmic ones."""
     slope = np.where(model.parameters.logarithmic, model.parameters.to_values(point), 1.0)
     return np.asarray(slope[:, None] * at.covariance * slope)
 

@@ -21,7 +21,7 @@ ABSORBED = 4.0
 
 @dataclass(frozen=True)
 class Linearisation:
-    """What is known near the answer, to first order.
+    """Linearised model near the answer.
 
     unknown: directions the data do not fix, in scaled parameters, (p, k); pseudo_inverse: (p, rows); scale: (p,)
     parts: the share of each block of residuals in the covariance, (blocks, p, p); noise: of each block
@@ -41,7 +41,7 @@ class Linearisation:
 
     @property
     def alone(self) -> Linearisation:
-        """What the residuals tell, as if all were known that is taken as known."""
+        """Linearisation by the residuals alone, as if all that is taken as known were exact."""
         count = len(self.parts) - self.given
         return replace(self, parts=self.parts[:count], noise=self.noise[:count], given=0)
 
@@ -53,7 +53,7 @@ class Linearisation:
 
 @dataclass(frozen=True)
 class Spread:
-    """Of a number that depends on the parameters: standard deviation, half of its interval, whether the data fix it."""
+    """Uncertainty of a function of the parameters: standard deviation, half interval, whether the data fix it."""
 
     std: float
     half: float
@@ -61,7 +61,7 @@ class Spread:
 
 
 def determined(singular: Array, right: Array, error: Array | None) -> npt.NDArray[np.bool_]:
-    """Which singular directions, rows of `right` (k, p), of a Jacobian the data tell, (k,).
+    """Singular directions, rows of `right` (k, p), of a Jacobian that the data determine, (k,), bool.
 
     Those along which the derivatives are larger than their `error` (rows, p). How weak they are beside the strongest
     one is a matter of the parameters' sizes alone; what they tell beside the noise is in the covariance. None: the

@@ -26,13 +26,13 @@ _STABLE = 0.9
 
 @dataclass(frozen=True)
 class Corrections:
-    """What either error adds to a point, (parameters,), None where there is none."""
+    """Corrections of a point by either error, (parameters,), None where there is none."""
 
     mesh: Array | None
     theory: Array | None
 
     def of(self, function: Callable[[Array], float], point: Array) -> tuple[float | None, float | None]:
-        """What they add to a function of the parameters."""
+        """Corrections of a function of the parameters."""
         mesh, theory = (
             None if shift is None else function(point + shift) - function(point) for shift in (self.mesh, self.theory)
         )
@@ -140,7 +140,7 @@ def difference(
     scene: Scene,
     factors: Mapping[str, float] | None = None,
 ) -> Array | None:
-    """What another scene, or fields times factors, change of the residuals, (rows,); None where it cannot be run."""
+    """Change of the residuals by another scene, or fields times factors, (rows,); None where it cannot be run."""
     columns = []
     for name, recording in model.measurement.recordings.items():
         try:

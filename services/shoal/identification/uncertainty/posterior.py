@@ -54,7 +54,7 @@ _NEWS = 0.2
 
 @dataclass(frozen=True)
 class PosteriorMarginal:
-    """Of one parameter in its own unit: moments, median, the central 95 %, and how much the draws are worth for it.
+    """Marginal of one parameter in its own unit: moments, median, central 95 %, and effective sample sizes.
 
     size, tail: effective sizes for the middle and for the tails, see `mixing`
     """
@@ -95,7 +95,7 @@ class Posterior:
 
     @property
     def correlations(self) -> Array:
-        """Of the parameters, (parameters, parameters)."""
+        """Correlations of the parameters, (parameters, parameters)."""
         return np.atleast_2d(np.corrcoef(self.flat.T))
 
     @property
@@ -253,7 +253,7 @@ def _summarise(
 
 
 def _marginal(draws: Array) -> PosteriorMarginal:
-    """Of one parameter's draws (ensembles, steps, walkers)."""
+    """Return the marginal of one parameter's draws (ensembles, steps, walkers)."""
     # Ranks are scipy's, which an identification without draws need not load.
     from shoal.identification.uncertainty.chains import bulk_size, r_hat, tail_size
 

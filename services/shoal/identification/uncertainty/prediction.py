@@ -97,7 +97,7 @@ class Prediction:
 
     @property
     def ratio(self) -> float:
-        """How many times worse than stated it is: RMS over limit of the worst channel, nan where there is no limit."""
+        """Ratio of the error to the stated one: RMS over limit of the worst channel, nan where there is no limit."""
         return max((channel.rms / channel.limit for channel in self.channels), default=float("nan"))
 
     def finding(self, named: bool) -> Finding:
@@ -112,7 +112,7 @@ class Prediction:
         return kind.found(text, begin=begin, end=end, ratio=self.ratio)
 
     def to_json(self) -> dict[str, Any]:
-        """What `--json` tells of it."""
+        """Object that `--json` prints."""
         return plain(  # type: ignore[no-any-return]
             {
                 "recording": self.recording,
@@ -226,7 +226,7 @@ def _hidden(slopes: Array, at: Linearisation) -> bool:
 def _bias(
     window: ForwardModel, point: Array, seen: dict[str, Array], there: Sensitivity, fit: Fit, error: ModelError
 ) -> Array:
-    """What a finer mesh and a fuller theory would change of the prediction, by size, (rows,), in SI units.
+    """Change of the prediction by a finer mesh and a fuller theory, by size, (rows,), in SI units.
 
     seen: channels there by recording, (samples, channels)
     """

@@ -24,7 +24,7 @@ _FEWEST_PARTS = 4
 
 @dataclass(frozen=True)
 class Fit:
-    """What was fitted: rows (weighted) with their blocks, and what follows from them; fields: that are uncertain."""
+    """A fit: its weighted rows with their blocks, and what follows from them; fields: those that are uncertain."""
 
     seen: Sensitivity
     blocks: list[Block]
@@ -46,7 +46,7 @@ def block_of(model: ForwardModel, recording: int, channel: int, fit: Fit) -> int
 
 @dataclass(frozen=True)
 class ErrorBand:
-    """Of one channel: expected RMS, what it stays below, and the half width of the band, (samples,)."""
+    """Error band of one channel: expected RMS, limit of the RMS, and the half width of the band, (samples,)."""
 
     expected: float
     limit: float
@@ -67,7 +67,7 @@ def unevenness(residual: Array, count: int) -> float:
 
 
 def stated(slopes: Array, at: Linearisation, block: int, weight: float, level: float, uneven: float = 0.0) -> ErrorBand:
-    """What an estimate says of an RMS over samples with derivatives (samples, parameters), all in SI units.
+    """Stated error of an RMS over samples with derivatives (samples, parameters), all in SI units.
 
     The mean square of the error is a sum of squares of normal numbers with different variances: by its mean and its
     variance it is taken for a multiple of chi-square (Satterthwaite 1946). What is systematic adds to it.
@@ -143,7 +143,7 @@ def _parts(model: ForwardModel, number: int, held: HeldOut, count: int) -> Itera
 
 
 def _too_small(model: ForwardModel, number: int, out: Mask, kept: Mask, fit: Fit) -> float:
-    """How much larger than stated the error of a part is that was left out, to first order; 1 where it is unknown.
+    """Ratio of the error of a part that was left out to the stated one, to first order; 1 where it is unknown.
 
     A fit of the rest moves from the answer by a Gauss-Newton step.
     """

@@ -28,6 +28,7 @@ _POINTS = 14
 _FIRST = 0.5
 """First step outward, in standard deviations; the next ones are longer by _GROWTH."""
 _GROWTH = 1.4
+"""Ratio of a step outward to the one before: about three steps to the end of an interval."""
 _SHORTER, _SHORTEST = 4.0, 1024.0
 """A step that leads too far is divided by the first, down to the first step over the second."""
 _FAR = 4.0
@@ -178,7 +179,7 @@ _LEAST, _MOST = 0.7, 1.4
 
 
 def bent(model: ForwardModel, point: Array, at: Linearisation, seen: Sensitivity) -> list[int]:
-    """Which parameters have an interval at whose ends the misfit is not as promised. Not counted. Raises TimeIsUp.
+    """Parameters with an interval at whose ends the misfit is not the predicted one. Not counted. Raises TimeIsUp.
 
     The others follow by linear theory; one call for all ends. What another drive or another known field would make of
     the answer is no move along this misfit: the intervals are those of the residuals alone.

@@ -14,7 +14,9 @@ from shoal.identification.uncertainty.linearisation import Linearisation
 from shoal.trajectory import Array
 
 _INVOLVED = 1e-2
+"""Share of an open direction from which on a parameter is part of it."""
 _POWERS = range(-3, 4)
+"""Exponents of a product: inertia and stiffness of a section depend on cubes of lengths."""
 _MOST = 5
 """Parameters in a product, at most."""
 

@@ -25,8 +25,11 @@ _SURE = 1e-4
 AGREED = 1e-2
 """Relative difference of two derivatives that count as one."""
 _ROUNDS = 4
+"""Rounds of differences along singular directions, at most."""
 _WELL_CONDITIONED = 1e3
+"""Condition number below which errors along strong directions hide no weak one."""
 _NONE = 1e-200
+"""Relative to the largest singular value: a smaller one is zero, and the condition number infinite."""
 _SHORTER = 0.75 ** np.arange(1, 9)
 """Parts of a record that are tried where the derivatives of the whole cannot be believed."""
 

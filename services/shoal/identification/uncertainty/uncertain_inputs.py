@@ -94,7 +94,7 @@ def uncertain_fields(model: ForwardModel, point: Array, predicted: Mapping[str, 
 
 
 def _moved(model: ForwardModel, point: Array, predicted: Mapping[str, Array], entry: Mapping[str, float]) -> Array:
-    """What one uncertainty changes of the residuals to first order, from both sides, or the one that can be run."""
+    """Change of the residuals by one uncertainty, to first order, by differences on the sides that can be run."""
     at = {path: float(model.scene.value(path)) for path in entry}
     step = min(1.0, _STEP / max(abs(size / (at[path] or 1.0)) for path, size in entry.items()))
     sides = list[Array]()

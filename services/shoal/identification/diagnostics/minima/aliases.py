@@ -33,6 +33,7 @@ _UNRESOLVED = 0.3
 _SAMPLES = 40
 """So many instants are scanned, or twice as many, and so on, until they vary by as much as the record."""
 _VARYING = 0.5
+"""Of the spread of all samples: what the first samples show at least before they stand for all."""
 _COARSE, _MOST = 33, 2048
 """Points of a scan in the beginning, and at most."""
 
@@ -82,7 +83,7 @@ def _first_part(model: ForwardModel) -> ForwardModel:
 
 
 def _limit(model: ForwardModel, point: Array) -> float:
-    """Up to which fitness a point explains a part of the record about as well as the answer."""
+    """Largest fitness with which a point explains a part of the record about as well as the answer."""
     mine = float(model.cost(model.uncounted(point[None]))[0])
     return mine + (HARDLY * model.rows.signal) ** 2 * len(model.rows.time) / model.rows.samples
 
@@ -107,7 +108,7 @@ def _unresolved(model: ForwardModel, point: Array, k: int) -> bool:
 
 
 def _dips(model: ForwardModel, point: Array, k: int) -> Array:
-    """Where the misfit dips along the bounds of a parameter, the others following to first order, the best first."""
+    """Local minima of the misfit along a parameter, the others following to first order, the best first."""
     others = np.arange(len(point)) != k
     rows = len(model.rows.time)
 

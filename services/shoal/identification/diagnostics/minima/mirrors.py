@@ -19,26 +19,25 @@ from shoal.identification.conventions import GROSS, HARDLY
 from shoal.identification.diagnostics.minima.other_starts import mirrored, turned, within_bounds
 from shoal.identification.diagnostics.minima.rivals import apart
 from shoal.identification.forward import ForwardModel
-from shoal.identification.methods.lanes import Descent, descend_many, kept_apart
+from shoal.identification.methods.lanes import DESCENTS, FEW, Descent, descend_many, kept_apart
 from shoal.identification.methods.outcome import Outcome
 from shoal.identification.methods.starts import poses_at
 from shoal.trajectory import Array
 
 _MOST = 256
 """Images by each combination of reflections; of machines with more only those of all angles, and of single ones."""
-_SIMULATED, _FOLLOWED = 16, 4
 
 
 def mirror_images(model: ForwardModel, outcome: Outcome) -> list[Descent]:
     """Return the ends of descents from images that fit about as well as the answer. Raises TimeIsUp."""
     # Where a body turns more often it begins where it does in the answer.
-    more = kept_apart([outcome.point, *turned(model, outcome.point)], partial(apart, model))[1 : 1 + _SIMULATED]
+    more = kept_apart([outcome.point, *turned(model, outcome.point)], partial(apart, model))[1 : 1 + 2 * DESCENTS]
     points = np.array([*_alike(model, outcome.point, images(model, outcome.point)), *more])
     if not len(points):
         return []
     values = model.cost(model.uncounted(points))
     left = np.sqrt(np.maximum(values - outcome.fitness, 0.0) * model.rows.samples / len(model.rows.time))
-    good = [k for k in np.argsort(values, kind="stable") if left[k] < HARDLY * model.rows.signal][:_FOLLOWED]
+    good = [k for k in np.argsort(values, kind="stable") if left[k] < HARDLY * model.rows.signal][:FEW]
     if not good:
         return []
     *descents, own = descend_many(model, np.vstack([points[good], outcome.point]))
@@ -131,5 +130,5 @@ def _alike(model: ForwardModel, point: Array, candidates: Array) -> Array:
             if channel.is_pose:
                 size = float(np.nanstd(recording.values[:, k]))
                 off = np.maximum(off, np.abs(difference) / max(size, 1e-300))
-    order = np.argsort(np.where(np.isfinite(off), off, np.inf), kind="stable")[:_SIMULATED]
+    order = np.argsort(np.where(np.isfinite(off), off, np.inf), kind="stable")[: 2 * DESCENTS]
     return np.asarray(candidates[[k for k in order if off[k] <= GROSS]])

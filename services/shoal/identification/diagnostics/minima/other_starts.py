@@ -172,7 +172,7 @@ class _ReachableStart:
         return _directions([*np.eye(3), *_principal(self.scene, body).T, *through])
 
     def _wanted(self, body: str, **vectors: Array) -> Wanted | None:
-        """What a start of a body with these vectors says; None where the parameters do not state it that way."""
+        """Parameters of a body's start with these vectors; None where they do not state it that way."""
         start, wanted = self.scene.initial[body], dict[str, float]()
         for quantity, vector in vectors.items():
             paths, known = [f"initial.{body}.{quantity}.{k}" for k in range(3)], getattr(start, quantity)
@@ -224,7 +224,7 @@ class _ReachableStart:
 
     @cached_property
     def _free(self) -> Array:
-        """Which parameters are of the start, or stand in ties alone, (parameters,), bool."""
+        """Mask of the parameters of the start, or that stand in ties alone, (parameters,), bool."""
         parameters = self.model.parameters
         return np.asarray(parameters.initial | np.array([not path for path in parameters.paths]))
 

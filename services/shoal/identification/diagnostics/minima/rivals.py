@@ -40,7 +40,7 @@ def rivals_of(model: ForwardModel, outcome: Outcome, at: Linearisation) -> list[
 
 
 def as_good(model: ForwardModel, outcome: Outcome, at: Linearisation) -> float:
-    """Up to which fitness another point explains the data as well as the answer within the noise."""
+    """Largest fitness with which a point explains the data as well as the answer within the noise."""
     doubt = chi_square_above(len(outcome.point), 1.0 - LEVEL) * _unit(at) / model.rows.samples
     least = max(outcome.fitness, model.rows.things * (model.rows.noise or 0.0) ** 2)
     return outcome.fitness + min(doubt, 0.5 * least) + 1e-18
@@ -196,7 +196,7 @@ def same_at_samples(model: ForwardModel, one: Array, other: Array) -> bool:
 
 
 def relation(model: ForwardModel, one: Array, other: Array) -> str:
-    """What another solution is to the first: a mirror image, another clock or camera, or just different."""
+    """Relation of another solution to the first: a mirror image, another clock or camera, or just different."""
     if same_at_samples(model, one, other):
         return ALIAS
     changed = np.flatnonzero(differing(model, one, other))

@@ -22,6 +22,7 @@ from shoal.scene.joints import places
 from shoal.trajectory import Array
 
 _EARTH = 9.81
+"""Standard gravity [m/s^2], by which a machine without gravity is scaled."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,7 @@ class Size:
 
     @property
     def rate(self) -> float:
-        """Of a swing [rad/s]."""
+        """Angular frequency of a swing [rad/s]."""
         return float(np.sqrt(self.gravity / self.length))
 
 
@@ -117,7 +118,7 @@ class FaultHypothesis:
 
     @property
     def paths(self) -> set[str]:
-        """Of its numbers."""
+        """Paths of its numbers."""
         return {str(parameter.path) for parameter in self.parameters}
 
     def freed(self, model: ForwardModel) -> ForwardModel:
@@ -170,6 +171,7 @@ def with_parameters(model: ForwardModel, candidates: list[FaultHypothesis]) -> F
 
 
 _ITERATIONS = 15
+"""Gauss-Newton steps of a refit at most: a fault that is near is found in a few, others are followed later."""
 
 
 def groups_of(candidates: Iterable[FaultHypothesis]) -> list[list[FaultHypothesis]]:

@@ -49,7 +49,7 @@ def _friction(scene: Scene, size: Size) -> Iterator[FaultHypothesis]:
 
 
 def resisting(name: str, joint: Resisted, field: str, size: Size) -> FaultHypothesis:
-    """What a joint by name resists with by one of RESISTING."""
+    """Candidate of a joint's resistance by one of RESISTING."""
     turning = isinstance(joint, Revolute)
     force = size.mass * size.gravity * (size.length if turning else 1.0)
     rate = size.rate * (1.0 if turning else size.length)
@@ -241,7 +241,7 @@ def springs(scene: Scene, size: Size) -> Iterator[FaultHypothesis]:
 
 
 def _loads(name: str, joint: dict[str, Any]) -> dict[str, Any]:
-    """Of a hinge: a spring that is at rest where the directions of its bodies agree, and a constant torque."""
+    """Loads in a hinge: a spring at rest where the directions of its bodies agree, and a constant torque."""
     first, second = joint["first"], joint["second"]
     axis = {"axis": joint["axis"]} if joint.get("axis") is not None else {}
     # On the ground a direction does not depend on the place.

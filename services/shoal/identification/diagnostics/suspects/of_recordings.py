@@ -53,7 +53,7 @@ def of_measurement(model: ForwardModel) -> Iterator[FaultHypothesis]:
 
 
 def _of(runs: list[Recording], name: str | None = None) -> Iterator[FaultHypothesis]:
-    """What recordings state, by the first one; name: of the only one, whose own it then is."""
+    """Candidates by what recordings state, by the first one; name: of the only one, whose own it then is."""
     first, channels = runs[0], [channel for run in runs for channel in run.channels]
     own, of = ((), "") if name is None else ((name,), f" of recording {name}")
     positions = any(channel.is_position for channel in channels)
@@ -93,6 +93,7 @@ def _delay(name: str, stated: float, end: float, own: tuple[str, ...]) -> FaultH
 _UNITS = (1e3, 1e2, 25.4, float(np.degrees(1.0)))
 """Between metres, millimetres, centimetres and inches (by millimetres), degrees and radians."""
 _TO_INCHES = 0.0254
+"""Metres in an inch."""
 _FAR = 4.0
 """Positions are read in a unit in which they lie within so many times the machine's reach, and not within 1 over it."""
 _SWINGS = (0.3, 60.0)

@@ -44,9 +44,11 @@ _HOPELESS = 0.98
 _SHARES = np.array([1.0, 0.5, 0.2, 0.05, 0.0])
 """Of the change that the regression promises, from the best of which a fit starts."""
 _SCAN = 11
+"""Values over the bounds of a candidate: a tenth of the range apart."""
 _ALIKE = 0.999
 """Cosine of two effects beyond what the parameters follow: from here on small faults are not distinguished."""
 _PATIENCE = 10.0
+"""As PATIENCE, of a descent beside the search: a side question is given up earlier."""
 _WHOLLY = 1.1
 """Times the noise: what leaves no more explains a misfit wholly."""
 
@@ -246,7 +248,7 @@ class _FaultSearch:
         return found
 
     def _score(self, together: Together, number: int, way: int, effects: Array) -> _Scored | None:
-        """Of one way, whose effects are (effects, rows)."""
+        """Score one way to measure a candidate's effects, (effects, rows)."""
         if not np.all(np.isfinite(effects)):
             return None
         candidate = together.group[number]
