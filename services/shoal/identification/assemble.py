@@ -139,7 +139,7 @@ def _findings(
         *_refuted(judgement, predicted),
         *(judgement.findings or _ended(outcome)),
         *outcome.findings,
-        *(_beside(model, near, known, judgement, values) if judgement.verdict.trusted else []),
+        *(_remarks_of(model, near, known, judgement, values) if judgement.verdict.trusted else []),
         *remarks(
             values,
             known.profiled,
@@ -168,7 +168,7 @@ def _ended(outcome: Outcome) -> list[Finding]:
     return [kinds.SEARCH_ENDED.found(outcome.message)] if outcome.message else []
 
 
-def _beside(
+def _remarks_of(
     model: ForwardModel, near: Evidence, known: Surroundings, judgement: Judgement, values: dict[str, Value]
 ) -> list[Finding]:
     """Return what other friction laws would change of an answer, and what its intervals hold beyond noise."""

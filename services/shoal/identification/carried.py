@@ -32,8 +32,8 @@ class Carried:
     """Transferred estimate: values, covariance and ties that other commands use.
 
     values: by path in the scene, ties evaluated; parameters: by name; left: what is not carried, and why
-    uncertainties: by how much fields are off together, a standard deviation along each direction of what is left open
-    unknown: fields whose values the recording did not tell
+    uncertainties: joint errors of fields, one standard deviation along each direction that is left open
+    unknown: fields whose values the recording did not determine
     source: where it comes from; trusted: whether its verdict is an answer
     """
 
@@ -46,7 +46,7 @@ class Carried:
     trusted: bool = True
 
     def notes(self) -> list[str]:
-        """Note that goes with these values wherever they are set."""
+        """Note that goes with these values where they are set."""
         notes = []
         if not self.trusted:
             notes.append(f"{self.source}: the verdict on these values is that they cannot be trusted")

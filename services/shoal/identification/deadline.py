@@ -1,4 +1,4 @@
-"""How long an identification may take: one deadline for all its stages, and what a simulation will cost."""
+"""Deadline of an identification, one for all its stages, and the predicted cost of a simulation."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Deadline:
     """When an identification has to end. limit [s]: as asked for, from its beginning; cost [s]: of the dearest call.
 
     A simulation cannot be broken off, so each is refused that would take longer than is left, by the pace of those
-    before it; of the first the beginning is run to tell.
+    before it; of the first a beginning is run to measure it.
     """
 
     def __init__(self, limit: float) -> None:
@@ -94,7 +94,7 @@ class Deadline:
     def _probe(self, kind: object, scene: Scene, times: Array, run: Run) -> None:
         """See the pace by the beginning of a record, a longer one while what every run costs may be most of it.
 
-        Where there is no time for a longer one, a shorter one tells what every run costs, such as assembling it.
+        Where there is no time for a longer one, a shorter one shows the fixed cost of a run, such as assembling it.
         """
 
         def spent_on(part: float) -> tuple[float, Trajectory]:

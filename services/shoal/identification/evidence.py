@@ -1,4 +1,4 @@
-"""What runs beside an answer tell of it before anybody judges: residuals, derivatives, the model's error, tests."""
+"""Evidence at an answer, before it is judged: residuals, derivatives, the model's error, tests."""
 
 from __future__ import annotations
 

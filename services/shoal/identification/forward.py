@@ -118,7 +118,7 @@ class ForwardModel:
         return replace(self, measurement=self.measurement.until(end), whole=self.whole or self)
 
     def aside(self, **changes: Any) -> ForwardModel:
-        """The model with some of its fields changed, whose runs nobody is charged for."""
+        """The model with some of its fields changed, whose runs are not counted."""
         other = replace(self, memory=None, whole=None, **changes)
         if not changes:
             other.__dict__.update({name: self.__dict__[name] for name in _KEPT if name in self.__dict__})
@@ -132,7 +132,7 @@ class ForwardModel:
         return np.asarray(self.counter(points))
 
     def uncounted(self, points: Array) -> Array:
-        """As `residuals`, for what looks at an answer instead of seeking it. Raises TimeIsUp."""
+        """Return `residuals` without counting the runs, for diagnostics of an answer. Raises TimeIsUp."""
         return np.concatenate([self._simulated_residuals(part) for part in self._portions(points)])
 
     def fitness(self, points: Array) -> Array:
@@ -270,7 +270,7 @@ class ForwardModel:
     @cached_property
     def _native(self) -> ForwardModel:
         """Placing bodies is the same for every engine, and the native one places all points in one call."""
-        return replace(self, engine=get_engine("gauss"), measurement=self.measurement.changed(_not_felt))
+        return replace(self, engine=get_engine("gauss"), measurement=self.measurement.changed(_not_sensors))
 
     def scene_at(self, point: Array, name: str | None = None) -> Scene:
         """The scene of a point, in a recording (else the first). Raises InputError."""
@@ -379,7 +379,7 @@ class ForwardModel:
         return self.compared(points, {name: self.observe(points, name) for name in self.measurement.recordings})
 
     def compared(self, points: Array, seen: Mapping[str, Array]) -> Array:
-        """As `residuals`, of points whose channels are known: by recording, as `observe` gives them."""
+        """Return `residuals` of points whose channels are known: by recording, as `observe` gives them."""
         columns = []
         for name, recording in self.measurement.recordings.items():
             columns.append((seen[name] - recording.values)[:, np.isfinite(recording.values)])
@@ -408,7 +408,7 @@ class ForwardModel:
         return (self.rows.noise or 1.0) * np.array(rows).reshape(len(rows), len(points)).T
 
 
-def _not_felt(recording: Recording) -> Recording:
+def _not_sensors(recording: Recording) -> Recording:
     """Without the channels that sensors feel."""
     shown = [k for k, channel in enumerate(recording.channels) if not channel.is_sensor]
     channels = tuple(recording.channels[k] for k in shown)
@@ -418,7 +418,7 @@ def _not_felt(recording: Recording) -> Recording:
 def _with_shared(
     scene: Scene, fixed: dict[str, float], values: dict[str, Array], lanes: int
 ) -> tuple[Scene, dict[str, Array]]:
-    """The scene with what is the same in all lanes, so that its model is kept, and what is left of the values."""
+    """The scene with what is the same in all lanes, so that its model is kept, and the remaining values."""
     shared = fixed | {path: float(x[0]) for path, x in values.items() if _same_in_all(path, x)}
     if not shared:
         return scene, values

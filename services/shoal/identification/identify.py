@@ -56,7 +56,7 @@ def identify(
     """Find the parameters of a problem.
 
     method: one of METHODS, else the problem's; data: recordings instead of the problem's own (see `measure`);
-    values: fields of the scene to set; fitted: values found before, starts of what is sought here, else set unless
+    values: fields of the scene to set; fitted: values found before, starts of parameters sought here, else set unless
     `values` sets them; measurement: one made earlier, to share it between methods;
     tolerance: error [m] that the model may have at the markers, for which elements, integrator and step are chosen
     instead of taken from the scene (coarse while searching);

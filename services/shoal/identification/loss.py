@@ -1,4 +1,4 @@
-"""How deviations count: losses that let outliers weigh less."""
+"""Robust losses, which let outliers weigh less (Huber, soft L1, Cauchy)."""
 
 from __future__ import annotations
 

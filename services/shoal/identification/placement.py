@@ -27,7 +27,7 @@ Place = Callable[[Array], Array]
 class AngleSensitivity:
     """Channels as functions of the angles at the start, all other parameters being constant.
 
-    angles: components of the angles; base: the point that tells the others, (parameters,); rest: (channels,);
+    angles: components of the angles; base: the point that determines the others, (parameters,); rest: (channels,);
     along, across, turning: A, B and S, (angles, channels)
     """
 

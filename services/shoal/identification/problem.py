@@ -125,7 +125,7 @@ class Problem(Record):
     constants: name -> field of the scene, for use in `ties` and `quantities`
     quantities: expressions in parameters and constants that the answer reports with their uncertainty
     uncertainties: standard deviations of fields of the scene that are taken as known, in SI units; as a list, each
-        entry tells by how much fields are off together, and the entries are independent of each other
+        entry states a joint error of fields, and the entries are independent of each other
     loss: how a deviation counts; all but `squares` let outliers weigh less
     """
 

@@ -92,7 +92,7 @@ def run_method(
 
 
 def _refused(model: ForwardModel) -> str:
-    """Why nothing could be simulated, and what to state where that may be due to where the search began."""
+    """Message that nothing could be simulated, with the remedy where the start of the search may be the cause."""
     middle = [name for name, parameter in model.problem.parameters.items() if parameter.start is None]
     if not middle:
         return model.refusal

@@ -1,4 +1,4 @@
-"""What the surroundings of an answer show of its parameters before it is judged: valley, intervals, profiles."""
+"""Surroundings of an answer before it is judged: valley, intervals, profiles."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def surroundings(model: ForwardModel, outcome: Outcome, near: Evidence, profiles
 
 
 def _curved(model: ForwardModel, outcome: Outcome, near: Evidence) -> list[int]:
-    """Parameters whose intervals linear theory does not tell; where the model limits them they are wider anyway.
+    """Parameters whose intervals linear theory does not give; where the model limits them they are wider anyway.
 
     Refits of a profile end on their way along the narrow valley of a chaotic motion, which would make it too narrow.
     """

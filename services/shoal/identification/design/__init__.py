@@ -1,4 +1,4 @@
-"""What to measure: the sensor, the duration and the rate that would sharpen the parameter that is known worst."""
+"""Optimal experiment design: the sensor, duration and rate that would sharpen the parameter that is known worst."""
 
 from shoal.identification.design.asked import SENSORS
 from shoal.identification.design.plan import ABOUT, Design, about_answer, about_start, design, has_data

@@ -1,4 +1,4 @@
-"""What a measurement is planned for: noise, duration and rate, as given or as the problem has them."""
+"""Noise, duration and rate of a planned measurement, as given or as the problem has them."""
 
 from __future__ import annotations
 

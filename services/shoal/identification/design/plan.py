@@ -1,7 +1,7 @@
-"""What to measure: which sensor and where, for how long and how often would sharpen the parameter that is known worst.
+"""Optimal experiment design: the sensor, place, duration and rate that would sharpen the worst known parameter.
 
 The sensitivities of every place to the parameters, at all times, come from one set of runs. With noise of a given size
-they tell the standard deviation of every parameter beforehand (Cramer-Rao bound; Atkinson, Donev, Tobias, Optimum
+they give the standard deviation of every parameter beforehand (Cramer-Rao bound; Atkinson, Donev, Tobias, Optimum
 Experimental Designs, 2007), to first order about one set of values.
 """
 
@@ -71,7 +71,7 @@ class Design:
 
     @property
     def message(self) -> str:
-        """Why it cannot be trusted; empty where it can."""
+        """Reason why it cannot be trusted; empty where it can."""
         if not self.doubt <= _ENOUGH:
             return (
                 f"sensitivities by two steps differ by {self.doubt:.0e}: the motion is chaotic, or rough by its solver"
@@ -82,7 +82,7 @@ class Design:
 
     @property
     def ok(self) -> bool:
-        """Return whether the best sensor tells the parameter, by sensitivities that can be believed."""
+        """Return whether the best sensor determines the parameter, by sensitivities that can be believed."""
         return not self.message
 
     def to_json(self) -> dict[str, Any]:
@@ -208,7 +208,7 @@ def _aim(model: ForwardModel, parameter: str | None) -> Aim:
 
 
 def _of_best_tilt(found: list[tuple[Sensor, Precision]]) -> list[tuple[Sensor, Precision]]:
-    """Without accelerometers of one axis that tell less than another in their place; the best come first."""
+    """Without accelerometers of one axis that determine less than another in their place; the best come first."""
     first = dict[object, Sensor]()
     for sensor, _ in found:
         first.setdefault(sensor.name if sensor.quantity == "one-axis" else sensor, sensor)
@@ -249,7 +249,7 @@ def about_answer(
     values: Mapping[str, Any] | None = None,
     **options: Any,
 ) -> Design:
-    """A design about what the problem's data (or `data`) tell; options: of `design`.
+    """A design about what the problem's data (or `data`) give; options: of `design`.
 
     Raises InputError, ComputationError where the answer cannot be trusted.
     """

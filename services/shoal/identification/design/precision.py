@@ -1,4 +1,4 @@
-"""What a measurement would tell: the precision of the parameters by some of the channels, until a time."""
+"""Predicted precision of the parameters by some of the channels, until a time (Fisher information)."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class Bundle:
         return cls(times, table, error, jacobian[rows:, 0], given, span, present, begins)
 
     def precision(self, columns: Sequence[int], end: float, every: int = 2) -> Precision:
-        """By some of the channels until a time [s], every so many instants."""
+        """By some of the channels until a time [s], at every n-th instant."""
         # The grid is twice as fine as today's sampling.
         sampled = slice(0 if self.begins else every - 1, None, every)
         keep = (self.times <= end * (1 + 1e-9))[sampled]
@@ -79,7 +79,7 @@ class Bundle:
 def precision(jacobian: Array, span: Array, error: Array | None = None, moved: Array | None = None) -> Precision:
     """Precision by rows of sensitivities over the noise, (rows, parameters), for ranges `span` (parameters,).
 
-    error: by how much they may be off, (rows, parameters); what is no larger, along some direction, tells nothing
+    error: by how much they may be off, (rows, parameters); what is no larger, along some direction, determines nothing
     moved: of the rows over the noise, by independent standard deviations of what is taken as known, (n, rows): a fit
     follows it
     """

@@ -1,4 +1,4 @@
-"""What could be measured: by a camera, by encoders, and by sensors on the machine."""
+"""Candidates of a measurement: by a camera, by encoders, and by sensors on the machine."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ class Sensor:
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """As signals."""
+        """Return them as signals."""
         where: dict[str, Any] = {"joint": self.name} if self.in_joint else {"marker": self.name, "to": self.to}
         where |= {"tilt": self.tilt} if self.tilt else {}
         where |= {"height": self.height} if self.height else {}
@@ -186,7 +186,7 @@ def _towards(axis: tuple[int, ...]) -> tuple[float, ...]:
 
 
 def columns_of(bundle: Bundle, sensors: list[Sensor]) -> dict[Sensor, list[int]]:
-    """The channels of each sensor, without those that tell nothing or the same as one before."""
+    """The channels of each sensor, without those that show nothing or the same as one before."""
     found: dict[Sensor, list[int]] = {}
     place = bundle.present
     for sensor in sensors:

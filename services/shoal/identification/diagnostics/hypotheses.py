@@ -250,10 +250,10 @@ class Suspect:
     """Something taken as known, the value it was given, the fitted one, and the misfit (RMS) with either.
 
     change: the two values in words; unit: of the misfits, empty where channels of different units are taken together
-    kind: `measurement`, `machine`, `data` (another reading of the recorded numbers) or `bounds` (of what is sought)
-    numbers: how many were fitted beyond what is sought
+    kind: `measurement`, `machine`, `data` (another reading of the recorded numbers) or `bounds` (of a sought parameter)
+    numbers: how many were fitted beyond the sought parameters
     chance: p-value of what it explains, corrected for all hypotheses that were tested
-    alike: other candidates of which a small fault has the same effect, whatever is measured by these channels
+    alike: other candidates of which a small fault has the same effect on these channels
     """
 
     name: str
@@ -288,7 +288,7 @@ class Suspect:
         return self.after**2 * penalty(self.numbers, rows)
 
     def equals(self, best: Suspect, rows: int) -> bool:
-        """Return whether so many rows do not distinguish it from the best one, which has no more numbers: alike within
+        """Return whether `rows` rows do not distinguish it from the best one, which has no more numbers: alike within
         chance.
         """
         alike = self.after**2 <= best.after**2 * max(1.0 + chi_square_above(1.0, DOUBT) / rows, 1.02)
@@ -296,5 +296,5 @@ class Suspect:
 
 
 def penalty(numbers: int, rows: int) -> float:
-    """A factor on a mean square, for numbers beyond the first that were fitted to so many rows (Schwarz 1978)."""
+    """A factor on a mean square, for numbers beyond the first that were fitted to `rows` rows (Schwarz 1978)."""
     return float(rows ** ((numbers - 1) / rows))

@@ -146,7 +146,7 @@ def _ambiguous(relations: set[str], count: int) -> Finding:
 
 
 def _moved(parameters: Mapping[str, Value], looked: FaultSearch, laws: set[str], rows: int) -> list[str]:
-    """Return what the best significant suspects, so many rows being measured, take out of its interval.
+    """Return the parameters that the best significant suspects, by `rows` rows, take out of their intervals.
 
     Another reading of the data has no interval in common with the stated one: it moves all parameters.
     laws: names of those beside a sought friction, which widen its interval
@@ -271,7 +271,7 @@ def _against(tests: ResidualTests) -> str:
 
 
 def _rough(model: ForwardModel, seen: Sensitivity) -> tuple[str, str]:
-    """Why derivatives by two steps differ, and what to do: the motion magnifies deviations, or the solver is rough."""
+    """Reason why derivatives by two steps differ, and remedy: a chaotic motion, or a rough solver."""
     if growth(model, seen.jacobian) > LARGE:
         return "the motion is chaotic", "shorten the record, or tighten the solver's tolerances"
     cause = "the solver's steps are too coarse for derivatives, or the motion jumps"

@@ -1,7 +1,7 @@
 """Friction laws left out beside a sought friction: how far each may move it, read from the table of hypotheses.
 
 The effects of viscous friction, quadratic drag and dry friction on a few swings are so alike that a law which was left
-out moves the sought number far beyond an interval that knows of none, and leaves hardly a misfit. Each law is a row of
+out moves the sought number far beyond an interval that knows of none, and leaves almost no misfit. Each law is a row of
 the table: where it is significant it is a suspect, and the intervals hold its refit instead of refuting the model.
 Where it is not, a finding says how far as much of it as the data allow would move the sought friction.
 """

@@ -1,4 +1,4 @@
-"""What the residuals say about the model: their size against the noise, whether they are white, outliers."""
+"""Residual tests: size against the noise (chi-square), whiteness (Ljung and Box), outliers."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ class ResidualTests:
 
     @property
     def explains_nothing(self) -> bool:
-        """Return whether a constant would fit as well, or hardly worse where nobody said that the noise is so large."""
+        """Return whether a constant would fit as well, or little worse where no such noise is stated."""
         if self.noise_stated:
             return self.too_large and self.size >= self.signal > 0.0
         return self.size >= MOSTLY * self.signal > 0.0
@@ -214,7 +214,7 @@ def residual_tests(
 
 
 def _chance_of_white(residual: Array, blocks: list[Block]) -> float:
-    """By the worst channel of a residual (rows,), as there are so many (Bonferroni)."""
+    """By the worst channel of a residual (rows,), corrected for their number (Bonferroni)."""
     chances = [ljung_box(residual[block.rows]) for block in blocks]
     return min(1.0, min(chances) * len(chances))
 
@@ -233,7 +233,7 @@ def _excess(residuals: list[Array], noise: float, mesh: float, fast: bool) -> fl
 def _alike(signal: Array, fast: bool) -> float:
     """The part of the sum of squares of a signal (samples,) that is no white noise.
 
-    Neighbours tell that of a slow one; of one that swings fast, what earlier samples foretell by linear prediction.
+    By neighbours for a slow signal; for one that swings fast, by the part that linear prediction explains.
     """
     neighbours, lags = float(signal[1:] @ signal[:-1]), min(_LAGS, len(signal) // 5)
     if not fast or lags < 1:

@@ -1,6 +1,6 @@
-"""Whether an answer stands at a minimum: what one Gauss-Newton step from there would gain.
+"""Stationarity of an answer: the gain of one Gauss-Newton step from there.
 
-Least squares end where the step vanishes; a swarm ends when its iterations are used up, wherever it is then. What
+Least squares end where the step vanishes; a swarm ends when its iterations are used up, at any place. What
 remains to go is measured by the uncertainty that the answer would have at the minimum: an end within it is as good as
 the minimum, for the data do not distinguish them.
 """

@@ -147,7 +147,7 @@ def _wide(model: ForwardModel, point: Array) -> npt.NDArray[np.bool_]:
 
 
 def explained(model: ForwardModel, outcome: Outcome) -> bool:
-    """Return whether a fit leaves no more than noise, as stated or as the data tell it, or little of what was
+    """Return whether a fit leaves no more than noise, as stated or as the data show it, or little of what was
     measured.
     """
     rows = len(model.rows.time)

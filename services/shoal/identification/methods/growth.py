@@ -1,4 +1,4 @@
-"""How fast a deviation of what is sought grows over the record: by that a record is short or long for a machine."""
+"""Growth of a deviation of the parameters over the record: by that a record is short or long for a machine."""
 
 from __future__ import annotations
 

@@ -55,7 +55,7 @@ class Descent:
 
     @property
     def message(self) -> str:
-        """Why it is no answer; empty if it has converged."""
+        """Reason why it is no answer; empty if it has converged."""
         return "" if self.converged else f"no convergence after {len(self.rows)} iterations"
 
 
@@ -106,7 +106,7 @@ def descend_each(
     patience: float = np.inf,
     most: int = _ITERATIONS,
 ) -> list[Descent]:
-    """As `descend_many`, of several models with as many rows, from a start of each side by side; most: iterations."""
+    """Descend as `descend_many`, on several models with as many rows, from one start each; most: iterations."""
     first = differentiate(range(len(models)), starts)
     searches = [Search(*at) for at in zip(models, starts, *first, strict=True)]
     return _descend(searches, differentiate, lambda *_: None, patience, most)
@@ -209,7 +209,7 @@ class SearchHistory(list[tuple[int, float, float]]):
 
 @dataclass
 class Search:
-    """One descent between two calls of the model: `ask` for a trial point, then `tell` what was found there.
+    """One descent between two calls of the model: `ask` for a trial point, then `tell` its residuals.
 
     fixed: number of a parameter that stays where it is
     """

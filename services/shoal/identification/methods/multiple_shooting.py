@@ -90,7 +90,7 @@ class Segments:
         return {paths.index(path): k for path, k in found.items()}
 
     def measured(self) -> Array | None:
-        """States (segments, states) by the poses and slopes of the data; None where these do not tell them."""
+        """States (segments, states) by the poses and slopes of the data; None where these do not determine them."""
         width = 2 * len(self.model.scene.bodies)
         states = [self._state_of(starting_points(self.model)[0])]
         for k in range(1, len(self.begins)):
@@ -189,7 +189,7 @@ class Segments:
         return states
 
     def _window(self, k: int) -> ForwardModel:
-        """The machine from the begin of a segment on, with the samples that tell its state there."""
+        """The machine from the begin of a segment on, with the samples that determine its state there."""
         mine = self.number == k
         times = self.short.measurement.first.times[self.place[mine]]
         values = np.full((len(times), len(self.short.measurement.first.channels)), np.nan)

@@ -1,4 +1,4 @@
-"""What every identification method is given and what it returns."""
+"""Interface of identification methods: arguments and outcome."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Outcome:
     iterations: rows of (iteration, best fitness, mean fitness of the iteration)
     minima: other points where a local search ended, with their fitness
     choice: which method `auto` has taken, and why; ended: whether the method came to its end;
-    converged: whether what it ended with is a minimum, as far as it can tell
+    converged: whether what it ended with is a minimum, by its own criterion
     findings: what was found out on the way
     """
 

@@ -74,7 +74,7 @@ def first_horizon(model: ForwardModel) -> float:
 
 
 def fit(model: ForwardModel, start: Array) -> Branch:
-    """Levenberg-Marquardt of a few steps, which leaves near the start what the samples do not tell.
+    """Levenberg-Marquardt of a few steps, which leaves near the start what the samples do not determine.
 
     The start counts as a prior whose standard deviation is a part of a parameter's range, against the deviation that
     the fit has. So each step minimises another sum than the last, unlike in `numerics.levenberg_marquardt`.

@@ -1,4 +1,4 @@
-"""Where to start: every pose that the first samples allow (both elbow branches), rates by their slope.
+"""Starting points: every pose that the first samples allow (both elbow branches), rates by their slope.
 
 The first samples fix a pose up to its mirror images. The poses are found by the Levenberg-Marquardt method on the
 placement alone, from many starts at once; no motion is simulated.
@@ -86,7 +86,7 @@ def _first_pose(model: ForwardModel, name: str) -> tuple[Array, Array]:
 
 
 def _at_rest(model: ForwardModel, name: str) -> bool:
-    """Return whether the machine starts without any velocity, whatever the parameters are."""
+    """Return whether the machine starts without any velocity for all parameters."""
     start = model.scene_at(model.parameters.start, name)
     moving = any(body.rate or any(body.velocity or ()) for body in start.initial.values())
     paths = model.parameters.scene_values(model.parameters.start[None], name)

@@ -18,7 +18,7 @@ from shoal.swarm import Iafsa, minimize
 from shoal.trajectory import Array
 
 ITERATIONS = 100
-"""Iterations of a swarm, at most."""
+"""Iterations of a swarm, as in the paper (section 5)."""
 AGREED = 1e-4
 """IAFSA ends where all that its fish remember differs by less in chi-square: by a hundredth of a standard deviation."""
 

@@ -1,1 +1,1 @@
-"""From a recording as it is stated to samples in SI units: reading, mending, and what the numbers say by themselves."""
+"""Recordings: from a statement to samples in SI units by reading, mending and checks without a model."""

@@ -1,4 +1,4 @@
-"""Which instants of a motion the samples of a recording show, where each lane has a clock and a delay of its own."""
+"""Instants of a motion that the samples of a recording show, by the clock and the delay of each lane."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class LaneGroup(NamedTuple):
 
 
 def by_clock(times: Array, clock: Array, delay: Array, possible: npt.NDArray[np.bool_]) -> Iterator[LaneGroup]:
-    """The possible lanes, those together whose clocks hardly differ.
+    """The possible lanes, those with nearly the same clock together.
 
     times: of the samples, by the clock of the recording [s]; clock, delay [s], possible: (lanes,). Until its time zero
     a machine is held at its start.
@@ -52,7 +52,7 @@ def _distinct(rows: Array) -> tuple[Array, npt.NDArray[np.intp]]:
 
 
 def _alike(ends: Array) -> Iterator[npt.NDArray[np.intp]]:
-    """Numbers of runs by their ends [s], those together that hardly differ: by clocks in a difference, for instance."""
+    """Numbers of runs by their ends [s], nearly equal ones together: by clocks in a difference, for instance."""
     left = np.arange(len(ends))
     while left.size:
         near = np.abs(ends[left] - ends[left[0]]) <= _HARDLY * ends[left[0]]

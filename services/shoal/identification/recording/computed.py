@@ -40,7 +40,7 @@ def kept(engine: str, scene: Scene, times: Array, what: object, compute: Callabl
 
 
 def _program() -> tuple[object, ...]:
-    """All that the numbers depend on but for what is asked: packages, and the sources of this one."""
+    """All else that the numbers depend on: packages, and the sources of this one."""
     root = Path(__file__).parents[2]
     files = sorted((str(file), file.stat()) for file in root.rglob("*.py"))
     sources = tuple((name, about.st_size, about.st_mtime_ns) for name, about in files)

@@ -1,4 +1,4 @@
-"""Measured motion as samples: one recording, or several with what is known of them."""
+"""Measured motion as samples: one recording, or several with their known truth."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ FEWEST = 3
 class HeldOut:
     """Samples of a window that is predicted instead of fitted.
 
-    window [s]: as it is stated, by the clock of the table; times [s], (samples,), and values, (samples, channels): as
+    window [s]: as stated, by the clock of the table; times [s], (samples,), and values, (samples, channels): as
     those of the recording
     """
 
@@ -39,7 +39,7 @@ class Recording:
     origin: where the data come from; notes: what was found and mended in them
     held: windows that are not fitted, whose samples are not among the others
     begin [s]: when the motion starts, by the clock of the table
-    table: digest of the file that it is read from, whatever part of it; empty if there is none
+    table: digest of the file that it is read from, all of it; empty if there is none
     turns [rad]: whole turns that were taken off the channels, (channels,) or the same for all
     """
 
@@ -150,7 +150,7 @@ _ORDER = 4
 def noise_of(recording: Recording) -> Array:
     """Standard deviation of the noise of each channel, (channels,): as stated, else by differences of the data.
 
-    A smooth motion has small fourth differences, white noise has large ones: their median tells its size, and outliers
+    A smooth motion has small fourth differences, white noise has large ones: their median shows its size, and outliers
     do not change it. Motion that the sampling does not resolve counts as noise.
     """
     estimated = np.array([differences(recording.values[:, k]) for k in range(len(recording.channels))])

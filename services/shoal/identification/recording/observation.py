@@ -61,7 +61,7 @@ def observe(
     scene: Scene | None = None,
     values: Mapping[str, Array] | None = None,
 ) -> Array:
-    """The channels of a trajectory, (lanes, samples, channels). Raises InputError if its engine tells no rates.
+    """The channels of a trajectory, (lanes, samples, channels). Raises InputError if its engine gives no rates.
 
     scene, values by path, one for each lane: of the machine, which sensors of acceleration, force and strain need; the
     trajectory is then that of the scene with their markers, see `virtual_sensors.with_sensor_markers`

@@ -1,4 +1,4 @@
-"""What no search need find out: a recording in other units than was taken for granted, and a channel that stands still.
+"""Plausibility of recordings before a search: other units than stated, constant channels, repeated samples.
 
 A machine that only swings by gravity has a time scale and a size of its own. A recording that contradicts them by far
 is refused with the unit that it seems to have; who states the unit is believed.
@@ -183,7 +183,7 @@ def check_repeated(recordings: Mapping[str, Recording], files: Mapping[str, Path
     """Refuse two recordings that are fitted to the same samples of a channel. Raises InputError.
 
     files: where recordings were read from, by their names; the others are not looked at. Two windows of one file, other
-    columns of it, and what is held out are no repetition.
+    columns of it, and held-out windows are no repetition.
     """
     for one, other in combinations(files, 2):
         a, b = recordings[one], recordings[other]

@@ -65,12 +65,12 @@ def described(fields: Mapping[str, Any], path: Path) -> dict[str, Any]:
 
 
 def read(source: FileSource, channels: tuple[Channel, ...]) -> Recording:
-    """The recording that a source describes, without what is stated of it. Raises InputError."""
+    """The recording that a source describes, without its statements. Raises InputError."""
     return sampled(source, channels)[0]
 
 
 def sampled(source: FileSource, channels: tuple[Channel, ...]) -> tuple[Recording, FileSource]:
-    """As `read`, and the source with what its table says of the unit of time."""
+    """Return the result of `read`, and the source with the unit of time of its table."""
     path = Path(source.path or "")
     table = load_table(path, source.columns)
     of_units: list[str] = []

@@ -1,4 +1,4 @@
-"""What the rows of a residual vector are: one for each number that was measured, over all recordings."""
+"""Rows of a residual vector: one for each number that was measured, over all recordings."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class ResidualRows:
     """The rows of a measurement; those of priors, at the end of a residual vector, are not among them.
 
     recording, time, channel: number of the recording, time by its clock [s] and number of the channel, (rows,) each
-    whole: the measurement of which this is a part, or itself; it tells the noise that nobody stated
+    whole: the measurement of which this is a part, or itself; by it a noise that is not stated is estimated
     """
 
     measurement: Measurement
@@ -77,7 +77,7 @@ class ResidualRows:
 
     @cached_property
     def estimated(self) -> Array:
-        """Noise of each row, (rows,): as stated, else as the recording tells it without any model."""
+        """Noise of each row, (rows,): as stated, else as estimated from the recording without a model."""
         return self._each([noise_of(recording) for recording in self.whole.recordings.values()])
 
     def _each(self, sizes: list[Array]) -> Array:
@@ -113,7 +113,7 @@ def _channels_of(measurement: Measurement) -> list[tuple[Channel, ...]]:
 def _beside(recording: Recording) -> Array:
     """Noise of each channel, (channels,), by which it counts beside others: stated, else estimated, but never nothing.
 
-    Of a signal that is free of noise, or does not move, differences tell none.
+    Of a signal that is free of noise, or does not move, differences show none.
     """
     spread = np.nanstd(recording.values, axis=0)
     largest = np.nanmax(np.abs(recording.values), axis=0)

@@ -1,4 +1,4 @@
-"""How measured motion is stated: which column is which signal, in which units, by which clock."""
+"""Statement of measured motion: columns, signals, units and clock."""
 
 from __future__ import annotations
 

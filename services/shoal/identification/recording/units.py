@@ -85,7 +85,7 @@ def with_units(
 ) -> tuple[FileSource, tuple[Channel, ...], list[str]]:
     """Statements of a recording, completed by the units of its table, and a note for each that they contradict.
 
-    What is stated wins. Raises InputError for a unit that is not known, or that of another kind of quantity.
+    Statements win. Raises InputError for a unit that is not known, or that of another kind of quantity.
     """
     if not units.of:
         return source, channels, []

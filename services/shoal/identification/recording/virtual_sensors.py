@@ -35,7 +35,7 @@ def from_start(times: Array, channels: tuple[Channel, ...]) -> Array:
 
 
 def needs_states(scene: Scene, channels: tuple[Channel, ...]) -> bool:
-    """Return whether sensors of some channels feel more than the motion of bodies tells: the machine bends or is in
+    """Return whether sensors of some channels need more than the motion of bodies: the machine bends or is in
     space.
     """
     if scene.dimensions == 3:
@@ -45,7 +45,7 @@ def needs_states(scene: Scene, channels: tuple[Channel, ...]) -> bool:
 
 
 def engine_options(engine: Engine, scene: Scene, channels: tuple[Channel, ...]) -> dict[str, bool]:
-    """Options by which an engine's run tells what the sensors of some channels need. Raises InputError if it cannot."""
+    """Options of an engine's run that give what the sensors of some channels need. Raises InputError if it cannot."""
     if not needs_states(scene, channels):
         return {}
     if not isinstance(engine, GaussEngine):
@@ -135,7 +135,7 @@ def _by_states(
 def _by_course(
     trajectory: Trajectory, scene: Scene, values: Mapping[str, Array], channel: Channel, alone: bool
 ) -> Iterator[tuple[int, Felt]]:
-    """The same of a rigid machine in the plane, by the motion of its bodies, whichever engine tells it."""
+    """The same of a rigid machine in the plane, by the motion of its bodies, of any engine."""
     from shoal.mechanics.analysis.course import machine, machines  # slow to import
 
     if trajectory.velocities is None or trajectory.rates is None:

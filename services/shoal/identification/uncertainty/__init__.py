@@ -1,1 +1,1 @@
-"""How well the answer is known: derivatives, covariance, intervals, profiles, and the model's own error."""
+"""Uncertainty of an answer: derivatives, covariance, intervals, profiles, and the model's own error."""

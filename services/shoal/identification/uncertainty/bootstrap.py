@@ -1,4 +1,4 @@
-"""Intervals without theory: refits to data whose residuals are drawn anew, in blocks that keep their correlation."""
+"""Intervals without theory: refits to data whose residuals are resampled, in blocks that keep their correlation."""
 
 from __future__ import annotations
 

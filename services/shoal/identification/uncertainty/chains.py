@@ -1,4 +1,4 @@
-"""How a density is sampled: by independent draws from a Student distribution, and by differences of walkers (emcee)."""
+"""Sampling of a density: independent draws from a Student distribution, differences of walkers (emcee), convergence."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def weights(logarithms: Array) -> Array:
 
 
 def possible(density: LogDensity, near: Independent, count: int, rng: np.random.RandomState) -> Array:
-    """So many points with a density, (count, parameters), from a distribution that narrows until it has some."""
+    """Points with a density, (count, parameters), from a distribution that narrows until it has some."""
     points = np.empty((0, len(near.centre)))
     for attempt in range(30):
         tried = near.centre + (near.draw(count, rng) - near.centre) * 0.8**attempt
@@ -132,7 +132,7 @@ def tail_size(draws: Array) -> float:
 
 
 def effective_size(draws: Array) -> float:
-    """So many independent draws would tell the mean as well as draws (ensembles, steps, walkers) do.
+    """Effective sample size for the mean of draws (ensembles, steps, walkers).
 
     The autocorrelation is summed to where pairs of neighbours turn negative, and never rises (Geyer 1992).
     """

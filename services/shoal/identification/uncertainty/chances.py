@@ -8,17 +8,17 @@ from scipy import special
 
 
 def above_chi_square(freedom: float, x: float) -> float:
-    """Return the probability that chi-square with so many degrees of freedom is above x; 1 from x = 0 down."""
+    """Return the probability that chi-square with given degrees of freedom is above x; 1 from x = 0 down."""
     return float(special.chdtrc(freedom, max(x, 0.0)))
 
 
 def chi_square_above(freedom: float, chance: float) -> float:
-    """Return the value that chi-square with so many degrees of freedom is above with a probability."""
+    """Return the value that chi-square with given degrees of freedom is above with a probability."""
     return float(special.chdtri(freedom, chance))
 
 
 def student_above(freedom: float, chance: float) -> float:
-    """Return the value that Student's t with so many degrees of freedom is above with a probability."""
+    """Return the value that Student's t with given degrees of freedom is above with a probability."""
     return -float(special.stdtrit(freedom, chance))
 
 

@@ -26,7 +26,7 @@ class Value:
     None if not computed; it is not added, but is in the interval
     theory: what shear and rotary inertia would add where slender beams neglect them; likewise
     unit: of all of them, empty where there is none or none is known
-    fixed: whether the data limit it at all; an estimate tells neither deviation nor interval of what they do not
+    fixed: whether the data limit it at all; an estimate has neither deviation nor interval of others
     """
 
     value: float
@@ -41,7 +41,7 @@ class Value:
     fixed: bool = True
 
     def reported(self) -> Value:
-        """As an estimate tells it: theory to first order knows nothing along what is open, nor beyond a bound."""
+        """Return it as reported: linear theory gives no interval along open directions, nor at a bound."""
         return replace(self, std=np.nan, lower=np.nan, upper=np.nan) if self.at_bound or not self.fixed else self
 
     def exponential(self) -> Value:
@@ -130,7 +130,7 @@ class Refit:
 def with_refits(model: ForwardModel, values: dict[str, Value], refits: list[Refit]) -> dict[str, Value]:
     """Values whose intervals span those of refits too; what a refit leaves open is not identifiable.
 
-    Neither is what the data tell no better than the bounds do.
+    Neither is a parameter that the data determine no better than the bounds do.
     """
     ends = [values, *(refit.values() for refit in refits)]
     determined = {name: all(end[name].identifiable for end in ends) for name in values}

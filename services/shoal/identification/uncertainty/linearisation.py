@@ -1,4 +1,4 @@
-"""How well the parameters are known: covariance with correlated noise, intervals, and what the data leave open."""
+"""Linearised uncertainty of parameters: covariance with correlated noise, intervals, and open directions."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Linearisation:
     parts: the share of each block of residuals in the covariance, (blocks, p, p); noise: of each block
     given: how many of them, the last, are not of residuals but of what is taken as known (see `given`)
     systematic: norm of what is systematic in the residual. A model error moves the parameters by the part of it that
-    they can follow, which leaves no residual; taken as ABSORBED times what is left, in the worst direction, it holds
+    they can follow, which leaves no residual; taken as ABSORBED times the residual, in the worst direction, it holds
     the truth for 95 % of random wrong models (python -m shoal_validation.coverage.systematic)
     """
 
@@ -64,7 +64,7 @@ def determined(singular: Array, right: Array, error: Array | None) -> npt.NDArra
     """Singular directions, rows of `right` (k, p), of a Jacobian that the data determine, (k,), bool.
 
     Those along which the derivatives are larger than their `error` (rows, p). How weak they are beside the strongest
-    one is a matter of the parameters' sizes alone; what they tell beside the noise is in the covariance. None: the
+    one is a matter of the parameters' sizes alone; what they are beside the noise is in the covariance. None: the
     error is not known.
     """
     largest = np.max(singular, initial=0.0)

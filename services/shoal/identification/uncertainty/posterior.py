@@ -2,7 +2,7 @@
 
 Sampled by emcee (Foreman-Mackey et al. 2013) in several ensembles that know nothing of each other: by independent draws
 from a distribution that is fitted to the posterior, and by differences of walkers, which follow shapes that it has not.
-Where draws about the answer, weighted by the density, are worth much, they tell that distribution and where walkers
+Where draws about the answer, weighted by the density, are worth much, they give that distribution and where walkers
 begin; elsewhere a beginning of the chains does.
 """
 
@@ -172,7 +172,7 @@ def posterior(
     wanted: int,
     seed: int = 0,
 ) -> Posterior:
-    """Draw until so many effective ones are there, or no more can be had.
+    """Draw until there are enough effective draws, or no more can be had.
 
     point: the answer; least: its sum of squares; wanted: effective size for the middle and the tails of each parameter.
     Time that is up ends it too, what was drawn until then counts. Raises InputError, and TimeIsUp with too few draws.

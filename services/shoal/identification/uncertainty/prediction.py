@@ -92,7 +92,7 @@ class Prediction:
 
     @property
     def refutes(self) -> bool:
-        """Return whether a right model would hardly be so far off."""
+        """Return whether a right model would be so far off less than once in a thousand times."""
         return any(channel.rms > channel.most for channel in self.channels)
 
     @property

@@ -1,4 +1,4 @@
-"""What an estimate says of the error of a prediction: noise, the parameters' covariance, and what is systematic."""
+"""Stated error of a prediction (noise, covariance, systematic residual), checked by parts of the fit left out."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class ErrorBand:
 
 
 def unevenness(residual: Array, count: int) -> float:
-    """Variance of the mean square of so many neighbouring residuals, relative to its square, as parts of the fit show.
+    """Variance of the mean square of `count` neighbouring residuals, relative to its square, as parts of the fit show.
 
     Noise that is larger at times, or has outliers, makes it larger than its memory does.
     """

@@ -1,4 +1,4 @@
-"""What the data leave open, in the user's words: `only E/rho`, or relative changes that do not show."""
+"""Confounded parameters in words: products that are known (`only E/rho`), or relative changes that do not show."""
 
 from __future__ import annotations
 

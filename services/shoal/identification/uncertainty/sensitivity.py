@@ -107,9 +107,9 @@ def _seen(model: ForwardModel, point: Array, residual: Array, either_side: Eithe
 
 
 def believed(model: ForwardModel, point: Array, residual: Array | None = None) -> Sensitivity:
-    """As `sensitivity`, but of a chaotic motion only of the beginning that has derivatives, where there is one.
+    """Return `sensitivity`, of a chaotic motion that of the beginning which has derivatives, if any.
 
-    Intervals that rest on the beginning are too wide rather than too narrow: what follows is not held to tell anything.
+    Intervals that rest on the beginning are too wide rather than too narrow: what follows is not used.
     """
     seen = sensitivity(model, point, residual)
     if seen.reliable or not seen.possible:
@@ -141,7 +141,7 @@ def _apart(model: ForwardModel, ahead: Array, behind: Array) -> tuple[Array, Arr
 
 
 def _side_by_side(model: ForwardModel, ahead: Array, behind: Array) -> tuple[Array, Array]:
-    """As `_apart`, with the two sides of each point in neighbouring lanes."""
+    """Run both sides of each point as `_apart` does, in neighbouring lanes."""
     seen = model.uncounted(np.stack([ahead, behind], axis=1).reshape(-1, ahead.shape[1]))
     return seen[::2], seen[1::2]
 

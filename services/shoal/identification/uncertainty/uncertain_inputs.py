@@ -1,4 +1,4 @@
-"""What a fit takes as given though it is known with an uncertainty: to first order, what that does to the answer.
+"""Uncertain inputs that a fit takes as given (signals, weighed masses), and their effect on the answer to first order.
 
 No residual shows it: the model has the given values. The answer moves against what other values change of the channels.
 """
@@ -172,7 +172,7 @@ def noisy_signals(scene: Scene) -> dict[str, tuple[Function, float]]:
 
 
 def _shown(path: str, signal: Function) -> float:
-    """The noise that the samples of a drive show, as far as they tell noise from motion."""
+    """The noise that the samples of a drive show, as far as they distinguish noise from motion."""
     if path.split(".")[0] not in _DRIVES or not signal.smooth:
         return 0.0
     times, values = np.array(signal.table).T
@@ -219,7 +219,7 @@ def finer_of(signal: Function) -> tuple[Function, float] | None:
     """A table as a spline of high degree draws it, and by how much that is another function (root mean square).
 
     It is not farther off than the samples about the place are from each other. None for tables of few rows, of rows
-    that lie together, and of so many that a finer one has no place.
+    that lie together, and of more than leave place for a finer one.
     """
     # Importing scipy takes longer than most identifications take to look here.
     from scipy.interpolate import make_interp_spline

@@ -4,7 +4,7 @@ Samples in even steps show a vibration of frequency f and one of n times the sam
 the bounds hold motions that the samples do not resolve, each parameter is scanned over its bounds on the first samples,
 so finely that no swing is missed, the others following to first order; from the dips of the misfit descents go on to
 the whole record. Where an answer leaves a misfit, its start may be the alias: from starts that turn more often between
-samples it is sought anew over growing parts of the record, as the first samples show all of them alike.
+samples it is sought again over growing parts of the record, as the first samples show all of them alike.
 """
 
 from __future__ import annotations

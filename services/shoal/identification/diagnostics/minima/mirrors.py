@@ -108,7 +108,7 @@ def _reflected(model: ForwardModel, point: Array, recordings: tuple[str, ...]) -
 
 
 def _few(count: int) -> list[tuple[int, ...]]:
-    """Kinds for so many angles: the same for all, and one that differs."""
+    """Kinds for a number of angles: the same for all, and one that differs."""
     alike = [(kind,) * count for kind in range(4)]
     return alike + [tuple(kind if i == k else 0 for i in range(count)) for k in range(count) for kind in range(1, 4)]
 

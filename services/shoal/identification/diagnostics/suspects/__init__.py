@@ -1,4 +1,4 @@
-"""Where a model does not fit: which of the things taken as known would explain it."""
+"""Fault hypotheses: which of the things taken as known would explain a misfit."""
 
 from shoal.identification.diagnostics.hypotheses import Suspect
 from shoal.identification.diagnostics.suspects.search import FaultSearch, suspects

@@ -131,7 +131,7 @@ class FaultHypothesis:
         return np.array([np.log(max(x, ROUND_OFF * p.upper)) if p.logarithmic else x for x, p in both])
 
     def at(self, way: int, amounts: Array) -> Array:
-        """The values within their bounds at which the effects are so many times those of the probes, (numbers,)."""
+        """Values within their bounds at which the effects are these multiples of the probes', (numbers,)."""
         base, probes = self.bases[way], self.probes[way]
         if self.law == "inverse":
             values = probes[0] / np.clip(amounts[0], 1 / _NEAR, _NEAR)

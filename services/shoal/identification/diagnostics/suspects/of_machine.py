@@ -1,4 +1,4 @@
-"""What a scene states or leaves out of a machine: friction, springs, masses, lengths, pivots, rates at the start."""
+"""Fault hypotheses about a machine: friction, springs, masses, lengths, pivots, rates, stated or left out."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a recording states: clock, camera, inertial sensors, the release, and the gravity there."""
+"""Fault hypotheses about a recording: clock, camera, inertial sensors, release, gravity, and other readings."""
 
 from __future__ import annotations
 
@@ -195,7 +195,7 @@ def _of_a_kind(one: Channel, other: Channel) -> bool:
 
 
 def _largest(runs: Iterable[Recording], quantities: set[str]) -> float:
-    """The largest number among channels of some quantities, less what is stated as their offset."""
+    """The largest number among channels of some quantities, less their stated offset."""
     return max(
         float(np.nanmax(np.abs(run.values[:, k] - channel.offset)))
         for run in runs

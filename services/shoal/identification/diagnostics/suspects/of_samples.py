@@ -121,7 +121,7 @@ class _Stretch:
 
 
 def _stretches(model: ForwardModel, residual: Array) -> Iterator[_Stretch]:
-    """Stretches of outliers of each place, with hardly any good samples between them."""
+    """Stretches of outliers of each place, with few good samples between them."""
     rows = model.rows
     usual = np.maximum(rows.estimated * rows.weight, MAD * float(np.median(np.abs(residual))))
     off = np.abs(residual) > OUTLIER * usual

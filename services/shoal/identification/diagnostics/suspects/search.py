@@ -1,10 +1,10 @@
-"""Where a model does not fit: which of the things taken as known would explain it.
+"""Search for fault hypotheses: which of the things taken as known would explain a misfit.
 
 A wrong clock or an omitted mass is a fault that no fit of the parameters shows. Each candidate is freed in turn and the
 residual is regressed on its effect, the parameters following; the most promising are then fitted together with the
 parameters, until one leaves no more than noise. A misfit that is a good part of the signal may also come from another
 reading of the numbers. Where nothing explains it, values of each candidate are tried over its whole range, and samples
-that contradict the rest are looked for. Whatever is scored or fitted is a row of the table of hypotheses, and one
+that contradict the rest are looked for. All that is scored or fitted is a row of the table of hypotheses, and one
 F-test decides about all of them.
 """
 
@@ -200,7 +200,7 @@ class _FaultSearch:
         return sorted((s for group in self._groups(candidates) for s in self._scored(group)), key=lambda s: s.promise)
 
     def _near(self, scored: list[_Scored]) -> list[_Scored]:
-        """Those that promise hardly less than the best."""
+        """Those that promise little less than the best."""
         return [s for s in scored if s.promise < SEVERAL * scored[0].promise]
 
     def alike(self, name: str) -> tuple[str, ...]:
@@ -369,7 +369,7 @@ class _FaultSearch:
     ) -> bool:
         """Return whether a fit explains the misfit; its row enters the table.
 
-        tested: drop, p-value and share; tests: so many hypotheses were looked at; change: stated and other value, words
+        tested: drop, p-value and share; tests: number of hypotheses looked at; change: stated and other value, words
         """
         drop, chance, explained = tested
         row = Hypothesis(name, kind, numbers, drop, chance, min(1.0, tests * chance), explained, fitted=True)
