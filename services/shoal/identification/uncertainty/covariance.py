@@ -130,8 +130,9 @@ def _expected(
 def _noise(block: Block, variance: float, rho: float, part: Array) -> Noise:
     """The noise with degrees of freedom by Satterthwaite (1946).
 
-    A stated noise is believed, unless a test at the level DOUBT contradicts it. Its correlation is not stated: the estimate is drawn towards none by its own variance of 1/n (James and Stein 1961), and its freedom is
-    what remains of the formula below.
+    A stated noise is believed, unless a test at the level DOUBT contradicts it. Its correlation is not stated: the
+    estimate is drawn towards none by its own variance of 1/n (James and Stein 1961), and its freedom is what remains of
+    the formula below.
 
     The logarithm of the variance of a mean is ln s^2 - 2 ln(1 - rho), where ln s^2 and rho of an AR(1) process have
     variances of 2/n and (1 - rho^2)/n (Priestley, Spectral Analysis and Time Series, 1981, 5.4).
