@@ -59,8 +59,9 @@ def size_of(scene: Scene) -> Size:
 FACTOR = 2.0
 """A positive number that is stated (a mass, a clock) is looked for within this factor."""
 PROBE = 1e-4
-"""Change by which an effect is measured, relative to the range that is looked for: small against the curvature of the
-motion, and far above the accuracy of the integrator.
+"""Change by which an effect is measured, relative to the range that is looked for. From 1e-5 to 1e-3 the effects of
+friction laws, which differ least, are the same to four digits; at 1e-6 the accuracy of the integrator hides what
+distinguishes them.
 """
 _NEAR = 1.04
 """An effect that goes with one over a number is followed by this factor from where it was probed."""

@@ -56,7 +56,7 @@ def resisting(name: str, joint: Resisted, field: str, size: Size) -> FaultHypoth
     upper = {"friction": force / rate, "drag": force / rate**2, "coulomb": 0.5 * force}[field]
     stated, path = float(getattr(joint, field)), f"joints.{name}.{field}"
     bounds = (0.0, max(upper, 4 * stated))
-    return FaultHypothesis.single(f"{RESISTING[field]} of {name}", path, stated, bounds, stated + DIFFERENCE * upper)
+    return FaultHypothesis.single(f"{RESISTING[field]} of {name}", path, stated, bounds, stated + PROBE * upper)
 
 
 def _masses(scene: Scene, size: Size) -> Iterator[FaultHypothesis]:
