@@ -15,9 +15,8 @@ from shoal.cli import main
 from shoal.engines import get_engine
 from shoal.errors import ComputationError, InputError
 from shoal.notebook import uncertain
-from shoal.response.allocate import Confirmed, Cut
-from shoal.response.allocate import cheapest as within
-from shoal.response.allocation import Allocation, cheapest, with_factors
+from shoal.response.allocate import Confirmed
+from shoal.response.allocation import Allocation, Cut, cheapest, with_factors
 from shoal.response.inputs import Inputs, UncertainParameter
 from shoal.response.limits.estimate import ExceedanceEstimate
 from shoal.response.marginals import Frozen, Interval, Normal, Scaled, Uniform
@@ -31,7 +30,7 @@ HEIGHT = "initial.P.position.1"
 def test_the_cheapest_factors_of_planes() -> None:
     """Sum(c / s) under sum(b s) = 1, by a general optimiser."""
     weights, costs, most = np.array([0.5, 1.0, 2.0, 0.0]), np.array([1.0, 2.0, 1.0, 1.0]), np.full(4, 3.0)
-    found = cheapest(weights, costs, 1.0, most)
+    found = cheapest([Cut(weights, np.zeros((4, 4)), 1.0)], costs, 0.0, most)
     other = optimize.minimize(
         lambda s: float(costs @ (1 / s)),
         np.full(4, 0.2),
@@ -270,7 +269,7 @@ def test_the_cheapest_factors_within_cones() -> None:
         Cut(np.array([1.5, 0.0, 0.0, 0.0]), np.diag([0.0, 0.2, 0.6, 0.0]), 3.5),
     ]
     costs, most, beta = np.array([1.0, 2.0, 1.0, 1.0]), np.full(4, 3.0), 3.0
-    found = within(cuts, costs, beta, most)
+    found = cheapest(cuts, costs, beta, most)
     random = np.random.default_rng(1)
     others = [
         optimize.minimize(

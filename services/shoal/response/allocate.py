@@ -16,14 +16,13 @@ limit gives.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy import optimize, special
+from scipy import special
 
 from shoal.errors import ComputationError
 from shoal.findings import Finding, message
@@ -36,8 +35,10 @@ from shoal.response.allocation import (
     TARGET,
     TIGHTEST,
     Allocation,
+    Cut,
     LeastMargin,
     accepted,
+    cheapest,
     costs_of,
     of_intervals,
     unattainable,
@@ -59,59 +60,9 @@ from shoal.response.runs import Answers, TimeIsUpError
 from shoal.trajectory import Array
 
 MARGIN = 0.01
-"""Of the reliability index, by which more is aimed at where a confirming study finds too little or too much."""
+"""Share of the reliability index that is aimed at in addition where a confirming study misses the target."""
 NEAR, OFF = 0.9, 0.5
 """Shares of the target from which a probability attains it, and below which tolerances are reported as too tight."""
-
-
-@dataclass(frozen=True)
-class Cut:
-    """Linear bound on the factors and their scatter, in units of the margin: pull @ s + beta |spread @ s| <= room.
-
-    pull: (parameters,); spread: of the margin by independent standard normal variables, (parameters, parameters)
-    """
-
-    pull: Array
-    spread: Array
-    room: float
-
-    def used(self, factors: Array, beta: float) -> float:
-        """The left side."""
-        return float(self.pull @ factors + beta * np.linalg.norm(self.spread @ factors))
-
-    def slope(self, factors: Array, beta: float) -> Array:
-        """Return the derivative of the left side by each factor, (parameters,)."""
-        along = self.spread @ factors
-        return np.asarray(self.pull + beta * self.spread.T @ along / max(float(np.linalg.norm(along)), 1e-300))
-
-
-def cheapest(cuts: list[Cut], costs: Array, beta: float, most: Array) -> Array:
-    """The factors, least sum(costs / s), within all cuts and with TIGHTEST <= s <= most."""
-    # A cut is homogeneous: the same share of the widest ones is within it.
-    share = min(1.0, *(one.room / max(one.used(most, beta), 1e-300) for one in cuts))
-    start = np.clip(share * most, TIGHTEST, most)
-
-    def within(one: Cut) -> optimize.NonlinearConstraint:
-        """Return the constraint of one cut on the logarithms of the factors."""
-
-        def used(x: Array) -> Array:
-            return np.array([one.used(np.exp(x), beta) / one.room])
-
-        def slope(x: Array) -> Array:
-            return np.asarray(one.slope(np.exp(x), beta) * np.exp(x) / one.room)[None]
-
-        return optimize.NonlinearConstraint(used, -np.inf, 1.0, jac=slope)
-
-    found: Any = optimize.minimize(  # type: ignore[call-overload]
-        lambda x: float(costs @ np.exp(-x)) / costs.sum(),
-        np.log(start),
-        jac=lambda x: -costs * np.exp(-x) / costs.sum(),
-        method="SLSQP",
-        bounds=[(math.log(TIGHTEST), math.log(top)) for top in most],
-        constraints=[within(one) for one in cuts],
-        options={"maxiter": 500, "ftol": 1e-10},
-    )
-    return np.asarray(np.exp(found.x) if found.success else start)
 
 
 @dataclass(frozen=True)

@@ -29,12 +29,13 @@ from shoal.trajectory import Array
 WIDEST, TIGHTEST = 3.0, 1e-3
 """Factors on the tolerances that are stated, beyond which none is tried."""
 ROUNDS = 15
+"""Linearisations, at most."""
 SETTLED = 5e-3
-"""Relative change of all factors at which the search ends."""
+"""Relative change of all factors at which the search ends: tolerances are stated to two or three digits."""
 MANY = 100_000
-"""Runs of a search for the place that decides."""
+"""Runs of a search for the decisive place, at most."""
 STEP = 0.02
-"""Of differences, as a share of a tolerance that is stated."""
+"""Step of differences, as a share of a stated tolerance."""
 TARGET = 1e-3
 """Probability of exceeding a limit, where none is stated."""
 Least = Callable[[Inputs], "LeastMargin"]
@@ -144,29 +145,54 @@ def with_factors(inputs: Inputs, factors: Array) -> Inputs:
     return replace(inputs, parameters=tuple(replace(one, marginal=scaled(one.marginal, float(f))) for one, f in pairs))
 
 
-def cheapest(weights: Array, costs: Array, room: float, most: Array) -> Array:
-    """The factors s, least sum(costs / s), with sum(weights s) = room and TIGHTEST <= s <= most.
+@dataclass(frozen=True)
+class Cut:
+    """Linear bound on the factors and their scatter, in units of the margin: pull @ s + beta |spread @ s| <= room.
 
-    By the multiplier of the constraint, s = sqrt(costs / (multiplier * weights)). A weight that is not positive does
-    not limit its factor.
+    pull: (parameters,); spread: of the margin by independent standard normal variables, (parameters, parameters)
     """
-    weight = np.maximum(weights, 0.0)
-    with np.errstate(divide="ignore"):
-        # In logarithms, as weights may be next to nothing.
-        alone = 0.5 * (np.log(costs) - np.log(weight))
-    ends = math.log(TIGHTEST), np.log(most)
 
-    def factors(logarithm: float) -> Array:
-        return np.asarray(np.clip(np.exp(np.clip(alone - 0.5 * logarithm, *ends)), TIGHTEST, most))
+    pull: Array
+    spread: Array
+    room: float
 
-    def beyond(logarithm: float) -> float:
-        return float(weight @ factors(logarithm)) - room
+    def used(self, factors: Array, beta: float) -> float:
+        """The left side."""
+        return float(self.pull @ factors + beta * np.linalg.norm(self.spread @ factors))
 
-    if beyond(-700.0) <= 0:
-        return factors(-700.0)
-    if beyond(700.0) >= 0:
-        return factors(700.0)
-    return factors(float(optimize.brentq(beyond, -700.0, 700.0, xtol=1e-12)))
+    def slope(self, factors: Array, beta: float) -> Array:
+        """Return the derivative of the left side by each factor, (parameters,)."""
+        along = self.spread @ factors
+        return np.asarray(self.pull + beta * self.spread.T @ along / max(float(np.linalg.norm(along)), 1e-300))
+
+
+def cheapest(cuts: list[Cut], costs: Array, beta: float, most: Array) -> Array:
+    """The factors, least sum(costs / s), within all cuts and with TIGHTEST <= s <= most."""
+    # A cut is homogeneous: the same share of the widest ones is within it.
+    share = min(1.0, *(one.room / max(one.used(most, beta), 1e-300) for one in cuts))
+    start = np.clip(share * most, TIGHTEST, most)
+
+    def within(one: Cut) -> optimize.NonlinearConstraint:
+        """Return the constraint of one cut on the logarithms of the factors."""
+
+        def used(x: Array) -> Array:
+            return np.array([one.used(np.exp(x), beta) / one.room])
+
+        def slope(x: Array) -> Array:
+            return np.asarray(one.slope(np.exp(x), beta) * np.exp(x) / one.room)[None]
+
+        return optimize.NonlinearConstraint(used, -np.inf, 1.0, jac=slope)
+
+    found: Any = optimize.minimize(  # type: ignore[call-overload]
+        lambda x: float(costs @ np.exp(-x)) / costs.sum(),
+        np.log(start),
+        jac=lambda x: -costs * np.exp(-x) / costs.sum(),
+        method="SLSQP",
+        bounds=[(math.log(TIGHTEST), math.log(top)) for top in most],
+        constraints=[within(one) for one in cuts],
+        options={"maxiter": 500, "ftol": 1e-10},
+    )
+    return np.asarray(np.exp(found.x) if found.success else start)
 
 
 def of_intervals(text: str, model: Model, inputs: Inputs, least: Least, costs: Array, most: Array) -> Allocation:
@@ -176,7 +202,7 @@ def of_intervals(text: str, model: Model, inputs: Inputs, least: Least, costs: A
     """
     factors, evaluations = np.ones(len(inputs)), 0
     stated, effects = math.nan, np.zeros(len(inputs))
-    cuts: dict[tuple[float, ...], tuple[Array, float]] = {}
+    cuts: dict[tuple[float, ...], Cut] = {}
     for round_ in range(ROUNDS):
         here = with_factors(inputs, factors)
         least_margin = least(here)
@@ -186,10 +212,10 @@ def of_intervals(text: str, model: Model, inputs: Inputs, least: Least, costs: A
             stated, effects = least_margin.attained, 0.01 * pull
         # A margin is taken for linear in the tolerances; each corner of the box has its own.
         room = least_margin.outer + float(pull @ factors)
-        cuts[tuple(np.sign(np.round(least_margin.xi, 3)))] = pull, room
-        fresh = _within(list(cuts.values()), costs, most)
         if room <= 0:
             raise unattainable(text)
+        cuts[tuple(np.sign(np.round(least_margin.xi, 3)))] = Cut(pull, np.zeros((len(pull), len(pull))), room)
+        fresh = cheapest(list(cuts.values()), costs, 0.0, most)
         settled = np.max(np.abs(fresh / factors - 1)) < SETTLED
         factors = fresh
         if settled:
@@ -199,23 +225,6 @@ def of_intervals(text: str, model: Model, inputs: Inputs, least: Least, costs: A
     found = [kinds.NOT_MET.found(why, margin=confirmed)] if confirmed < 0 else []
     cost = float(costs @ (1 / factors) / costs.sum())
     return Allocation(text, inputs, factors, effects, stated, confirmed, 0.0, cost, evaluations + more, found)
-
-
-def _within(cuts: list[tuple[Array, float]], costs: Array, most: Array) -> Array:
-    """The cheapest factors within all cuts, pull @ factors <= room."""
-    alone = [cheapest(pull, costs, room, most) for pull, room in cuts]
-    if len(alone) == 1:
-        return alone[0]
-    pulls, rooms = np.array([pull for pull, _ in cuts]), np.array([room for _, room in cuts])
-    found: Any = optimize.minimize(  # type: ignore[call-overload]
-        lambda s: float(costs @ (1 / s)),
-        np.min(alone, axis=0),
-        jac=lambda s: -costs / s**2,
-        method="SLSQP",
-        bounds=[(TIGHTEST, float(top)) for top in most],
-        constraints=optimize.LinearConstraint(pulls, -np.inf, rooms),
-    )
-    return np.asarray(found.x if found.success else np.min(alone, axis=0))
 
 
 def _outer(least: Least, inputs: Inputs) -> tuple[float, int]:

@@ -42,7 +42,7 @@ from shoal.response.study import Study
 from shoal.trajectory import Array
 
 UNRESOLVED = 1e-8
-"""Runs that differ by less than this share of a limit's quantity differ by the errors of their steps."""
+"""Share of a limit's quantity below which runs differ by the errors of their steps only."""
 
 
 def assess_limits(problem: UncertainProblem, found: ModelResponse) -> list[LimitResult]:

@@ -18,12 +18,13 @@ from scipy.linalg import solve_triangular
 from shoal.response.extremes import MOST_CORNERS, corners
 from shoal.response.inputs import BoolArray, Inputs
 from shoal.response.polynomials import Terms, size, total_degree
-from shoal.response.study import FAIR, LEAST, Study
+from shoal.response.study import Study, fair_runs
 from shoal.trajectory import Array
 
 CHOICE = 8
 """Candidate places for every term."""
 FEWEST = 256
+"""Candidate places, at least."""
 APART = 1e-3
 """Distance below which two places are one: about that of extremal points at the ends for degree 40, 1 / 40^2."""
 UNKNOWN = 1e-8
@@ -74,9 +75,9 @@ def box_design(inputs: Inputs, xi: Array, terms: Terms, count: int, seed: int) -
 MOST_ACTIVE = 10
 """Parameters up to which none is screened out."""
 SMALL = 0.02
-"""Share of the effects of all parameters that those which are screened out have together, at most, in each group."""
+"""Joint share of the effects of all parameters that those screened out have in each group, at most."""
 ALONE = 2
-"""Degree of the terms of a parameter that is screened out."""
+"""Degree of the terms of a parameter that is screened out: its effects at both ends and the centre determine two."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,7 @@ class Screened:
     @property
     def fair(self) -> int:
         """Runs that the terms may take without further reason, as `Study.fair`."""
-        return max(LEAST, int(FAIR * self.size(4)))
+        return fair_runs(self.size(4))
 
     def size(self, degree: int) -> int:
         """Number of `terms`."""

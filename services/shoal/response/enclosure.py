@@ -28,9 +28,10 @@ from shoal.response.study import FINE_GAP, SAFETY, DatedEnclosure, Enclosure, Fo
 from shoal.trajectory import Array
 
 CONTROLS = 64
-"""Runs, a power of two: along each axis one lies in every 64th, so that none misses a band of 3 % across the box."""
+"""Control runs, a power of two: along each axis one lies in every 64th, so that none misses a band of 3 % across the
+box."""
 UNSEEN = 0.05
-"""One less the confidence with which a larger part of the box than `unseen` would have been seen."""
+"""Complement of the confidence of 95 % of `unseen`."""
 
 
 def unseen(count: int) -> float:

@@ -20,9 +20,9 @@ from shoal.response.study import Study
 from shoal.trajectory import Array
 
 RANK = 1e-13
-"""Relative singular value below which a direction is left out."""
+"""Relative singular value below which a direction is left out: rounding of a least-squares fit."""
 SOLE = 1e-6
-"""Of one: a run with an influence above this share is taken for one with this share."""
+"""Complement of the leverage of a run that determines a term by itself, at least."""
 
 
 @dataclass(frozen=True)
@@ -109,6 +109,7 @@ def unexplained(values: Array, missed: Array) -> tuple[Array, Array]:
 
 
 HIGHEST_TRIED = 20
+"""Degree up to which expansions are tried."""
 WORSE = 2
 """Degrees in a row that no column gains by, after which no higher one is tried."""
 

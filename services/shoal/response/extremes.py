@@ -25,14 +25,15 @@ from shoal.response.inputs import IntArray
 from shoal.trajectory import Array
 
 DIFFERENCE = 1e-6
-"""Of standardised variables, for slopes."""
+"""Step of central differences in xi: about the cube root of the rounding unit."""
 FIRST_LENGTH = 0.1
 """Length of the first step."""
 DESCENTS = 30
+"""Quasi-Newton steps, at most."""
 SETTLED = 1e-12
-"""Share of the answers' size below which a step gains nothing."""
+"""Relative gain at which a descent ends."""
 BACK = 0.25
-"""A step that leads uphill is taken again, so much shorter."""
+"""Factor on a step that leads uphill (backtracking)."""
 
 Objective = Callable[[Array, IntArray], Array]
 """Places, (places, parameters), and which searches they belong to, (places,), to values, (places,)."""

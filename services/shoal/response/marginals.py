@@ -19,7 +19,7 @@ from shoal.response.polynomials import HERMITE, LEGENDRE, Recurrence, of_measure
 from shoal.trajectory import Array
 
 QUADRATURE = 32, 64
-"""Gauss points in each of so many parts of the probability that a measure is integrated over."""
+"""Gauss points in each part, and parts of the probability, that a measure is integrated over."""
 
 
 class Marginal(Protocol):

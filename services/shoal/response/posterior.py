@@ -25,13 +25,13 @@ from shoal.trajectory import Array
 
 ENDINGS = ".json", ".nc"
 DRAWS = 20_000
-"""Of more, as many are taken, evenly."""
+"""Draws that are kept, evenly, of more."""
 LEAST = 100
-"""Fewer draws are no distribution."""
+"""Draws of a distribution, at least."""
 FAR = 4.0
 """Standard deviations from the middle at which the scene must accept the values."""
 ALIKE = 0.999999
-"""Correlations are taken to be this at most, as rounding makes larger ones contradict each other."""
+"""Largest correlation: rounding makes larger ones contradict each other."""
 
 
 def is_source(given: str) -> bool:

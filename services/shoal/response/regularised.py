@@ -24,15 +24,17 @@ from shoal.response.polynomials import Terms
 from shoal.trajectory import Array
 
 HIGHEST = 24
-"""Degree in each parameter."""
+"""Degree in each parameter, at most."""
 SIZES, RATIOS, NOISE = (-14.0, 6.0), (-7.0, 4.0), (-27.0, 0.0)
 """Logarithms within which the most likely values are sought; noise: what is left of the answers' variance."""
 FIRST = -1.0, -1.0, -20.0
+"""Logarithms of size, ratio and noise with which the search begins."""
 STEPS = 80
+"""Steps of the search (L-BFGS-B), at most."""
 TOLD = 320
 """Runs to which the hyperparameters are fitted; all determine the coefficients."""
 TERMS = 1500
-"""The largest ones, by their variances."""
+"""Terms that are kept, those of the largest variances."""
 NOTHING = 1e-5
 """Share of the deviation that all coefficients may have together that are left out."""
 

@@ -29,7 +29,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 FAIR = 0.1
-"""Share of what varies up to which a known error of the model is small: a tenth of the width moves no bound far."""
+"""Share of what varies up to which a known error of the model is small: a tenth of the width moves no bound far
+(convention)."""
 BOUNDS = "lower", "upper", "lower_outer", "upper_outer"
 
 

@@ -16,7 +16,7 @@ from shoal.trajectory import Array
 Model = Callable[[Mapping[str, Array]], "Answers"]
 """Path -> values, (runs,), to answers."""
 SAME = 1e-9
-"""Germs closer than this are one run."""
+"""Distance below which two places are one run."""
 
 
 @dataclass(frozen=True)

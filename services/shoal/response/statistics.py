@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 from scipy import special
@@ -20,12 +19,13 @@ from scipy.stats import qmc
 
 from shoal.response.expansion import Expansion
 from shoal.response.inputs import BoolArray, Inputs, inside
-from shoal.response.study import Study
+from shoal.response.study import Study, TransformedMoments
 from shoal.trajectory import Array
 
 CONFIDENCE = float(special.ndtri(0.975))
 """Standard deviations within which a normal variable lies with 95 % probability."""
 QUANTILES = 0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99
+"""Levels of the quantiles that are reported."""
 DRAWN = 2**14
 """Places at which an expansion is evaluated for quantiles."""
 NOTHING = 1e-9
@@ -143,34 +143,12 @@ HALVES = 2.0
 of expansions fall faster."""
 
 
-class Moments(Protocol):
-    """Interface of moments of all columns, (columns,) each."""
-
-    @property
-    def mean(self) -> Array:
-        """Mean over all parameters."""
-        ...
-
-    @property
-    def variance(self) -> Array:
-        """Variance over all parameters."""
-        ...
-
-    @property
-    def left_out(self) -> Array:
-        """Error at runs that are left out of the fit."""
-        ...
-
-    @property
-    def squares(self) -> Array | None:
-        """The same of squares."""
-        ...
-
-
-def moment_errors(study: Study, found: Moments, fitted: Callable[[Study], Moments]) -> tuple[Array, Array]:
+def moment_errors(
+    study: Study, found: TransformedMoments, fitted: Callable[[Study], TransformedMoments]
+) -> tuple[Array, Array]:
     """Return the 95 % confidence errors of mean and std, (columns,) each; fitted: the expansion of fewer runs."""
     made, std, left_out = len(study.runs.xi), np.sqrt(found.variance), found.left_out
-    squares = left_out if found.squares is None else np.maximum(found.squares, left_out)
+    squares = np.maximum(found.squares, left_out)
     missing = np.divide(left_out**2, 2 * std, out=np.zeros_like(std), where=std > 0)
     scatter = CONFIDENCE * np.array([left_out / np.sqrt(made), np.hypot(squares / np.sqrt(made), missing)])
     apart, first = np.zeros_like(scatter), np.arange(made) < made // 2

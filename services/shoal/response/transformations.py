@@ -22,14 +22,14 @@ from shoal.response.polynomials import Recurrence, of_measure, size, total_degre
 from shoal.response.regularised import Decay, likeliest, regularised
 from shoal.response.runs import CachedModel
 from shoal.response.statistics import designs, jansen
-from shoal.response.study import CLEARLY, CONVERGED, Study
+from shoal.response.study import CLEARLY, CONVERGED, Other, Study
 from shoal.trajectory import Array
 
 Fitted = Callable[[Study], Expansion]
 """The expansion of a study."""
 
 
-class Transformation(Protocol):
+class Transformation(Other, Protocol):
     """A function of something simpler, in some columns; text: in words."""
 
     text: str
@@ -47,14 +47,6 @@ class Transformation(Protocol):
     @property
     def beyond(self) -> Array:
         """Part of the deviation that no run shows, (columns,)."""
-        ...
-
-    def __call__(self, xi: Array) -> Array:
-        """Return the answers, (places, columns)."""
-        ...
-
-    def indices(self) -> Array:
-        """First and total ones of Sobol, (2, parameters, columns), of parameters that do not correlate."""
         ...
 
     def some(self, which: BoolArray) -> Self:

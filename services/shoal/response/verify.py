@@ -92,7 +92,7 @@ def repeat_on_finer_mesh(machine: ResponseModel, runs: CachedModel) -> Finer | N
 
 
 NEGLIGIBLE = 0.01
-"""An error below this share of what the runs differ by rejects none of them."""
+"""Share of the spread of the runs below which an error rejects none of them (convention: one per cent)."""
 
 
 @dataclass(frozen=True, eq=False)

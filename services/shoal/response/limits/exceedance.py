@@ -55,9 +55,9 @@ def coarse(estimate: ExceedanceEstimate) -> list[Finding]:
 
 
 CHANCE = 1e-3
-"""Counts that are less likely than this contradict a probability."""
+"""Significance level of the binomial tests: three standard deviations, one-sided (convention)."""
 ROUGH = 2.0
-"""A probability without an interval may be off by this factor."""
+"""Factor by which a probability without an interval may be off."""
 
 
 def contradictions(

@@ -24,16 +24,17 @@ from shoal.response.runs import TooManyRunsError
 from shoal.trajectory import Array
 
 STEP = 0.01
-"""Of central differences, in standard deviations."""
+"""Step of central differences [standard deviations]."""
 ITERATIONS = 30
+"""Steps of a search, at most."""
 SHARES = 1.0, 0.5, 0.25, 0.1, 0.03
 """Of a step; all are tried. Where the limit is more curved than the sphere, whole steps go to and fro for ever."""
 ON, STRAIGHT = 1e-4, 1e-3
 """A design point lies on the limit within this distance and straight above its origin within that one."""
 NEAR = 0.1
-"""A search that ends farther from the limit has not found it."""
+"""Distance from the limit beyond which a search has failed."""
 APART = 0.3
-"""Design points that are nearer to each other are one."""
+"""Distance below which two design points are one."""
 NEGLIGIBLE = 1e-4
 """A design point with less than this share of the density of the nearest one does not count."""
 

@@ -12,7 +12,7 @@ from shoal.response.runs import Model, TooManyRunsError
 from shoal.trajectory import Array
 
 FAR = 8.0
-"""Distance from the origin up to which places are evaluated: beyond lies a probability of 1e-15."""
+"""Distance from the origin up to which places are evaluated: beyond lies a probability of 6e-16, the rounding unit."""
 
 
 @dataclass

@@ -20,16 +20,16 @@ from shoal.response.runs import TooManyRunsError
 from shoal.trajectory import Array
 
 SHARE = 0.1
-"""Of the runs of a level that the next one begins with."""
+"""Conditional probability of a level (Au and Beck 2001: p_0 = 0.1)."""
 LEVELS = 12
-"""After these, the probability is below 1e-12."""
+"""Levels at most: the probability is below SHARE^12 = 1e-12 after them."""
 BETWEEN = 1.3
 """The deviation is larger than what Au and Beck's formula gives, which leaves out that the chains of a level begin
 where those before it ended: by so much at most, over the closed forms of the tests."""
 SAME = 1e-8
 """Margins that differ by less than this part of the least one do not depend on what varies."""
 ACCEPTED = 0.44
-"""Share of the moves of a chain that is aimed at."""
+"""Acceptance rate that is aimed at (Papaioannou et al. 2015; Gelman, Roberts and Gilks 1996 for one dimension)."""
 
 
 @dataclass(frozen=True)

@@ -42,6 +42,7 @@ NOTHING = 1e-9
 UNLIKELY = 0.05
 """Probabilities of exceedance below this count as none: far from the limit many small ones would have large weights."""
 BLOCK = 10_000
+"""Places that are evaluated at once."""
 
 
 @dataclass(frozen=True)

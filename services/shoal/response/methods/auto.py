@@ -17,12 +17,14 @@ from shoal.response.methods.torus import Torus
 from shoal.response.study import COARSE, RUNS, Found, Study
 
 NO_SHARES = 0.15
-"""Beyond this one so do its Sobol indices, which are off by its square: more runs are made for them."""
+"""Error beyond which Sobol indices, which are off by its square (2 %), give way to those of more runs."""
 SAMPLED = 8192
+"""Quasi-random runs for Sobol's indices."""
 CYCLES = 6
-"""As few are followed at single instants."""
+"""Cycles up to which single instants are followed."""
 OUT_OF_PHASE = 1.0
-"""A phase that spreads further than this to either side [rad] takes polynomials of too high a degree."""
+"""Spread of the phase to either side [rad] beyond which polynomials take too high a degree: about the spread times the
+highest harmonic, + 10."""
 UNEVEN = 0.02
 """Cycles that differ more from the next are of more than one frequency."""
 

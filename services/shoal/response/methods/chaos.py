@@ -22,12 +22,13 @@ from shoal.response.transformations import Transformed, compared, transformed, u
 from shoal.trajectory import Array
 
 SHARE = 2.0
-"""Runs for every term, at least."""
+"""Runs for every term, at least: the oversampling ratio of 2 to 3 that is usual (Sudret 2008)."""
 FIRST = 128
 """Runs to begin with; they are doubled."""
 COARSE = 3e-2
 """Above this share, more runs are made: so many times."""
 MORE = 5
+"""Factor on the runs of a coarse expansion, at most."""
 DECAYS = 6
 """Columns to which the decay of coefficients is fitted."""
 

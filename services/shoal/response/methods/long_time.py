@@ -172,6 +172,7 @@ def refuse_without_course(study: Study, method: str) -> None:
 STRETCHES = 1.05, 1.2, 1.6
 """Runs are so many times as long as asked for: the slowest has to reach the phase of the fastest."""
 HIGHEST = 12
+"""Degree up to which surrogates are grown."""
 OFF = 2e-2
 """Share of the width above which a surrogate is no good."""
 

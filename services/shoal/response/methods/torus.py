@@ -32,7 +32,9 @@ LINES = 8
 PER_TERM = 6
 """Instants for every coefficient."""
 PADDED = 8
+"""Factor of zero padding of the spectrum."""
 REFINED = 12
+"""Gauss-Newton steps, at most."""
 SETTLED = 1e-10
 """Phase at the end [rad] by which frequencies change no more."""
 
