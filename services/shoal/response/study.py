@@ -23,9 +23,9 @@ ROUNDING = 1e-11
 LEAST = 18
 """Runs that a study may take without further reason, at least."""
 FAIR = 1.4
-"""And for every term of a polynomial of degree four. By `python -m shoal_validation.uncertain.fair`, 16 studies of two to
-four intervals: with 1.0 or 1.2 the gap (quantile of 75 %) is seven to nine times as large for 5 to 8 % fewer runs, with
-2.0 it is 0.8 of it for a third more.
+"""And for every term of a polynomial of degree four. By `python -m shoal_validation.uncertain.fair`, 16 studies of two
+to four intervals: with 1.0 or 1.2 the gap (quantile of 75 %) is seven to nine times as large for 5 to 8 % fewer runs,
+with 2.0 it is 0.8 of it for a third more.
 """
 SAFETY = 3.0
 """Factor on an error that was observed at a few runs (convention: three standard deviations)."""
