@@ -16,7 +16,6 @@ from shoal.engines.starts import Elsewhere, StatedStart
 from shoal.error_budget import ErrorBudget
 from shoal.errors import InputError
 from shoal.json_values import plain
-from shoal.mechanics import findings as kinds
 from shoal.scene import Scene
 from shoal.trajectory import Array, Status, Trajectory
 
@@ -216,7 +215,8 @@ def _gone_on(engine: Engine, scene: Scene, grid: Mapping[str, Array], found: Tra
         try:
             alone = engine.simulate(scene.with_values(values), found.times)
         except InputError as error:
-            findings[first] = [*findings[first], kinds.REFUSED.found(str(error))]
+            # The refusal of the scene alone names the field.
+            findings[first] = [replace(one, text=str(error), steps=()) for one in findings[first][:1]]
             continue
         take(alone, [int(first)])
         if left.size and alone.ok:
