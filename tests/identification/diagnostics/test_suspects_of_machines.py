@@ -73,7 +73,7 @@ def test_a_pivot_on_a_heavy_block_moves_as_a_pivot_that_is_driven() -> None:
     fields = dict(zip((p.path for p in candidate.parameters), values.tolist(), strict=True))
     on_a_block = get_engine("gauss").simulate(candidate.scene.with_values(fields), TIMES).points
     assert np.max(np.abs(on_a_block - expected)) < 1e-5
-    assert candidate.told(values)[0] == pytest.approx(amplitude)
+    assert candidate.described(values)[0] == pytest.approx(amplitude)
 
 
 def test_a_moving_pivot() -> None:
