@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 from dataclasses import replace
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -23,7 +24,7 @@ from shoal_flows.report.stored import stored
 from shoal_flows.tracking import addresses, store
 from shoal_flows.tracking.data import of_measurement, whole
 from shoal_flows.tracking.engines import log_comparison, log_forward, log_sweep
-from shoal_flows.tracking.identification import log_fit, log_outcome, open_study
+from shoal_flows.tracking.identification import log_fit, log_outcome, open_study, rounded
 from shoal_flows.tracking.store import connect
 
 
@@ -179,8 +180,26 @@ def test_experiments_explain_themselves(client: Any, fits: list[Fit]) -> None:
     assert state["orderByKey"] == "metrics.`final/fitness`"
     found = client.search_runs([experiment.experiment_id], state["searchFilter"], order_by=[state["orderByKey"]])
     logged = {f"metrics.`{name}`" for run in found for name in run.data.metrics}
-    logged |= {f"params.`{name}`" for run in found for name in run.data.params} | {"tags.`verdict`"}
+    logged |= {f"params.`{name}`" for run in found for name in run.data.params}
+    logged |= {f"tags.`{name}`" for run in found for name in run.data.tags}
     assert set(state["selectedColumns"]) <= logged
+    assert [section["name"] for section in state["compareRunSections"]] == ["fitness", "tip"]
+    assert {chart["metricSectionId"] for chart in state["compareRunCharts"]} == {"shoal-fitness", "shoal-tip"}
+
+
+@pytest.mark.parametrize(
+    ("value", "half", "text"),
+    [
+        (0.786012, 0.002983, "0.7860 ± 0.0030"),
+        (7.0123e10, 1.2e9, "7.01e+10 ± 1.2e+09"),
+        (58.95, 0.3, "58.95 ± 0.30"),
+        (1234.6, 50.0, "1235 ± 50"),
+        (2.1e-9, 1e-10, "2.10e-09 ± 1.0e-10"),
+        (0.123456, math.inf, "0.123 (open)"),
+    ],
+)
+def test_figures_of_a_column_have_two_digits_of_their_interval(value: float, half: float, text: str) -> None:
+    assert rounded(value, value - half, value + half) == text
 
 
 def test_an_older_experiment_gets_the_views(client: Any) -> None:

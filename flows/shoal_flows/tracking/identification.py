@@ -48,6 +48,7 @@ def log_outcome(study: Run, fits: Sequence[Fit], failures: Mapping[str, str], pi
         study.judge(*verdict(best.estimate))
         study.tags["machine"] = best.estimate.scene.name
         study.params({"method": best.cell.name})
+        study.tags |= _columns(best.estimate)
         study.metric("final/fitness", best.estimate.fitness)
         study.metric("final/rms", best.estimate.rms)
         for name, value in best.estimate.parameters.items():
@@ -86,11 +87,33 @@ def _values(estimate: Estimate) -> str:
     return ", ".join(f"{name} = {value.value:.6f}" for name, value in estimate.parameters.items())
 
 
+def _columns(estimate: Estimate) -> dict[str, str]:
+    """The answer and its fit for columns of the run table, rounded: MLflow writes all digits of its metrics."""
+    values = {**estimate.parameters, **estimate.quantities}
+    return {
+        "answer": ", ".join(
+            f"{name} {rounded(value.value, value.lower, value.upper)}" for name, value in values.items()
+        ),
+        "fit": f"fitness {estimate.fitness:.2e}, RMS {estimate.rms:.2e}",
+    }
+
+
+def rounded(value: float, lower: float, upper: float) -> str:
+    """Return a value with half of its interval, to two digits of that; a value without an interval to three digits."""
+    half = (upper - lower) / 2
+    if not (math.isfinite(half) and half > 0):
+        return f"{value:.3g} (open)"
+    digits = 1 - math.floor(math.log10(half))
+    if not -4 <= digits <= 6:
+        return f"{value:.{max(1, digits + math.floor(math.log10(abs(value) or 1)))}e} ± {half:.1e}"
+    return f"{round(value, digits):.{max(digits, 0)}f} ± {round(half, digits):.{max(digits, 0)}f}"
+
+
 def log_fit(fit: Fit, album: Album, study: str) -> str:
     """A child of the run `study` with all there is to know about one fit; returns its id."""
     cell, estimate = fit.cell, fit.estimate
     tags = {"kind": "optimisation", "problem": cell.title, "method": cell.method}
-    tags["findings"] = ", ".join(estimate.codes)
+    tags |= {"findings": ", ".join(estimate.codes), **_columns(estimate)}
     judged = verdict(estimate)
     about = "" if judged.doubts else estimate.message
     with open_run("Identification", cell.name, tags=tags, parent=study, description=about, took=estimate.wall_s) as run:
