@@ -110,6 +110,7 @@ def test_a_removable_gap_is_closed() -> None:
     assert along([fitted], 0, [0.0])[0] == pytest.approx(1.0, abs=1e-14)
 
 
+@pytest.mark.compiles  # a tenth of a second: nothing else asks for the distance of an array's function from Python
 def test_beyond_the_range_the_ends_hold() -> None:
     fitted = fitting.fit(lambda t: np.cos(t), 2.0, begin=-1.0)
     assert along([fitted], 0, [-5.0, 9.0]) == pytest.approx(np.cos([-1.0, 2.0]), abs=1e-15)

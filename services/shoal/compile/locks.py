@@ -23,7 +23,6 @@ from numba.core.compiler_lock import global_compiler_lock
 
 from shoal.compile import clock, content, linking, operators
 from shoal.compile.progress import report
-from shoal.compile.structures import Reference
 from shoal.errors import FULL, ComputationError
 
 if sys.platform != "win32":
@@ -31,17 +30,23 @@ if sys.platform != "win32":
 
 _SECONDS = {
     "least": 16.0,
-    "loop": 9.0,
+    "loop": 6.0,
     "motion": 4.0,
     "constrain": 3.0,
     "stiffness": 3.0,
     "force": 3.0,
     "settle": 2.0,
     "step": 2.0,
+    "step of Radau5": 10.0,
+    "step of GeneralizedAlpha": 10.0,
+    "step of EnergyMomentum": 9.0,
+    "step of ImplicitGauss": 6.0,
     "energy": 1.0,
     "energies": 1.0,
 }
 """Seconds that large kernels take to compile on one core of a server: for their order and the estimate shown."""
+_OF_ALL = ("Arrays", "Work")
+"""Structures that kernels are not made for by their names."""
 _WORTH_A_LINE = 1.0
 """Compilations that took at least so long are reported [s]."""
 _OBJECTS = 100_000
@@ -50,19 +55,20 @@ more."""
 
 
 def described(name: str, kinds: tuple[Any, ...]) -> str:
-    """Return a name of a kernel for people: its function, its structure and the number of lanes."""
-    if len(kinds) == 1 and isinstance(kinds[0], Reference):  # a frame
-        kinds = tuple(kinds[0].dtype)
+    """Return a name of a kernel for people: its function, the structure it is made for and the number of lanes."""
+    names = [getattr(getattr(kind, "instance_class", None), "__name__", "") for kind in kinds]
+    if names == ["Frame"]:
+        names, kinds = [], tuple(kinds[0].dtype)
     lanes = getattr(kinds[0], "count", 0) if kinds else 0
     width = {0: "", 1: ", single"}.get(lanes, ", lanes")
-    made_for = getattr(getattr(kinds[1] if len(kinds) > 1 else None, "instance_class", None), "__name__", "")
-    made_for = "" if made_for == "Arrays" else made_for
+    made_for = next((one for one in names if one and one not in _OF_ALL), "")
     return f"{name.lstrip('_')}{' of ' + made_for if made_for else ''}{width}"
 
 
 def seconds(name: str, kinds: tuple[Any, ...]) -> float:
     """Return about how long a kernel takes to compile [s]."""
-    return _SECONDS.get(described(name, kinds).partition(",")[0].partition(" of")[0], 1.0)
+    whole = described(name, kinds).partition(",")[0]
+    return _SECONDS.get(whole) or _SECONDS.get(whole.partition(" of")[0], 1.0)
 
 
 class _Listener(event.Listener):  # type: ignore[misc]

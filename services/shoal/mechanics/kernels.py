@@ -183,11 +183,12 @@ def family_pointers(name: str, tile: Tile, elements: tuple[Any, ...]) -> Index:
 def signatures(tile: Tile, arrays: Arrays, room: Work, *, every: bool = False) -> list[Kernel]:
     """Return the kernels that `ready` compiles, and the stiffness, for limits of stability and implicit steps.
 
-    every: the kernels of any model
+    every: the kernels of any model, for one lane those of damping as well, for small motions
     """
     found = [_kernel(name, tile, arrays, room) for name in (_STATE_KERNELS if every else _wanted(arrays))]
     elements = [family for family in arrays.elements if every or family.size > 0]
-    return found + [_kernel(name, tile, one) for name in ("force", "energy", "stiffness") for one in elements]
+    names = list(_FAMILY_KERNELS) if every and tile == SINGLE else ["force", "energy", "stiffness"]
+    return found + [_kernel(name, tile, one) for name in names for one in elements]
 
 
 def _wanted(arrays: Arrays) -> tuple[str, ...]:

@@ -6,7 +6,7 @@ import itertools
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import literal_unroll, njit
+from numba import literal_unroll, njit, typeof, types
 
 from shoal.compile import function_pointers, simd
 from shoal.compile.pointers import pointer, raw, shift
@@ -251,6 +251,16 @@ def _assembled(tile: Tile, t: Tangent, block: Array) -> Array:
     np.add.at(values, t.also, rows[t.more])
     np.add.at(values, t.slot, t.part.reshape(-1, width) * rows[t.shared])
     return values.ravel()
+
+
+def signatures(tile: Tile, arrays: Arrays, room: Work) -> list[kernels.Kernel]:
+    """Return the kernels of `stiffness_at` and `damping_at`, with the types of their arguments."""
+    lanes, rows, number = typeof(tile), typeof(room.z), types.int64
+    springs, functions = typeof(arrays.forces), typeof(arrays.functions)
+    families = [(_of_family, (lanes, number, typeof(one), rows, rows, rows, number)) for one in arrays.elements]
+    of_forces = _of_forces, (lanes, springs, functions, rows, rows, rows, rows, number)
+    of_dampers = _of_dampers, (lanes, springs, rows, rows, rows, rows, number)
+    return [*families, of_forces, of_dampers]
 
 
 # These take the structures that they need and no others: a kernel takes seconds to compile that is handed them all.

@@ -20,10 +20,11 @@ from numba import config
 
 from shoal.children import end_with_parent
 from shoal.compile import clock
+from shoal.compile.content import address_by_content
 from shoal.compile.locks import described, seconds
 from shoal.compile.progress import Note, reporting_to
 from shoal.errors import ShoalError
-from shoal.mechanics import kernels
+from shoal.mechanics import kernels, tangent
 from shoal.mechanics.analysis import evaluations
 from shoal.mechanics.assembly.build import build
 from shoal.mechanics.dynamics import work_space
@@ -35,9 +36,9 @@ from shoal.mechanics.numerics.tile import SINGLE, tiles
 from shoal.mechanics.simulate import simulate
 from shoal.scene import Scene, load_scene
 
-USUAL = ("dop853", "leapfrog", "generalized-alpha")
-"""Integrators that `auto` chooses for most machines: their kernels in space are compiled ahead, those of others when
-they are first used."""
+USUAL = ("dop853", "rk4", "leapfrog", "generalized-alpha")
+"""Integrators that `auto` or people choose for most machines: their kernels in space are compiled ahead, those of
+others when they are first used."""
 
 
 class KernelSignature(NamedTuple):
@@ -61,6 +62,7 @@ class KernelSignature(NamedTuple):
     def cached(self) -> bool:
         """Return whether the cache has it."""
         function = self.function
+        address_by_content(function)
         found = function._cache
         return found._index_key(self.kinds, function.targetctx.codegen()) in found._cache_file._load_index()
 
@@ -153,7 +155,7 @@ def required(scene: Scene, lanes: int, *, every: bool = False) -> list[KernelSig
     found = [(loop, (frame_type(frame),)), *signatures(tile, settings, arrays, room)]
     found += kernels.signatures(tile, arrays, room, every=every)
     if every and tile == SINGLE:  # statics, modes and reactions
-        found += evaluations.signatures(tile, arrays, room)
+        found += evaluations.signatures(tile, arrays, room) + tangent.signatures(tile, arrays, room)
     named = [KernelSignature(kernel.__module__, kernel.__name__, kinds) for kernel, kinds in found]
     if lanes > 1 and not every:  # lanes mostly differ in their start alone, and share one stability limit
         named = [kernel for kernel in named if kernel.name != "_stiffness"]
