@@ -167,8 +167,8 @@ def test_what_is_refused_before_it_is_computed_is_a_failed_run(client: Any) -> N
 
 
 def test_experiments_explain_themselves(client: Any, fits: list[Fit]) -> None:
-    with open_study("any", [fits[0].cell], fits[0].estimate.measurement):
-        pass
+    with open_study("any", [fits[0].cell], fits[0].estimate.measurement) as study:
+        log_fit(fits[0], pictures.Album({}, "", {}), study.run_id)
     experiment = client.get_experiment_by_name("Identification")
     assert experiment is not None
     assert "a child per method" in experiment.tags["mlflow.note.content"]
