@@ -408,6 +408,7 @@ ONLY_NATIVE = [
     pendulum("quintic", CABLE | {"element": "ancf-quintic"}),
     pendulum("full", CABLE | {"element": "ancf-full"}),
     pendulum("dry-pin", joints={"O": PIN["O"] | {"mu": 0.1, "radius": 0.01}}),
+    pendulum("stopped", joints={"O": PIN["O"] | {"stops": {"min": -4.0, "restitution": 0.5}}}),
     scene(
         "hose",
         {"A": {"kind": "point-mass", "mass": 1.0}},

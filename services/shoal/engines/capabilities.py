@@ -33,11 +33,13 @@ FEATURES = (
     "tapered flexible rods",
     "damped flexible rods",
     "damped rods in space",
+    "stops",
 )
 _FIELDS = {
     "coulomb": "dry friction",
     "drag": "quadratic drag",
     "mu": "friction by joint forces",
+    "stops": "stops",
     "first_to": "angles of places",
     "second_to": "angles of places",
 }

@@ -10,7 +10,7 @@ from numba import literal_unroll, njit
 from shoal.compile import function_pointers, simd, structures
 from shoal.compile.pointers import pointer, raw
 from shoal.compile.vector import clear
-from shoal.mechanics import applied, constraints, forces, rubbing
+from shoal.mechanics import applied, constraints, forces, gaps, rubbing
 from shoal.mechanics.derived import Derived, derive, fold
 from shoal.mechanics.elements import families
 from shoal.mechanics.least import principle
@@ -52,6 +52,7 @@ class Work(NamedTuple):
     until: Array
     gauss: least.GaussWork
     rubbing: Array
+    gaps: gaps.GapWork
 
 
 def work_space(tile: Tile, m: Arrays) -> Work:
@@ -84,6 +85,7 @@ def work_space(tile: Tile, m: Arrays) -> Work:
         np.full(1, np.inf),
         least.work_space(width, m),
         rubbing.room(width, m.rows, m.rubbing.size),
+        gaps.room(width, m.gaps.size, m.unknowns, m.rows, m.constraints.size),
     )
 
 
@@ -134,7 +136,7 @@ def free(m: Arrays) -> bool:
     """Return whether nothing acts on the machine but weight and undamped elements, and no constraint: as fast ones
     are.
     """
-    return m.constraints.size == 0 and m.table.sought == 0 and not loaded(m)
+    return m.constraints.size == 0 and m.table.sought == 0 and m.gaps.size == 0 and not loaded(m)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -142,7 +144,7 @@ def free_acceleration(tile: Tile, m: Arrays, w: Work, z: Array, zdot: Array, a: 
     """`force` and `accelerate` of a free machine: they look at few members of the structures."""
     _add_weight(tile, m, z, a, True)
     _add_elements(tile, m, w, z, zdot, a, ACCELERATION)
-    _solve(tile, m, w, a)
+    solve(tile, m, w, a)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -180,11 +182,13 @@ def accelerate(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, 
         arguments = (m, w, t, z, zdot, tolerance, a)
         function_pointers.call(m.table.constrain, (tile, *arguments))
     else:
-        _solve(tile, m, w, a)
+        solve(tile, m, w, a)
+        if m.gaps.size > 0:
+            function_pointers.call(m.table.contact, (tile, m, w, t, z, zdot, tolerance, a))
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def _solve(tile: Tile, m: Arrays, w: Work, a: Array) -> None:
+def solve(tile: Tile, m: Arrays, w: Work, a: Array) -> None:
     """Turn a force into the acceleration of a machine without constraints."""
     if m.alike.components > 0:
         alike.solve(tile, m.space, m.alike, w.element, a)
@@ -200,6 +204,8 @@ def constrain(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, t
         function_pointers.call_back(m.table.sought, t, a)
     else:
         _constrain(tile, m, w, t, z, zdot, tolerance, a)
+    if m.gaps.size > 0:
+        function_pointers.call(m.table.contact, (tile, m, w, t, z, zdot, tolerance, a))
     if m.driven:
         constraints.add_power(tile, m.constraints, m.functions, t, w.gauss.multiplier, w.power)
         for lane in range(len(tile)):
@@ -238,6 +244,9 @@ def remember(tile: Tile, m: Arrays, w: Work) -> None:
     if m.forces.size > 0:
         derive(tile, m.derived, w.z, m.unknowns, m.force_rows, False)
         forces.remember(tile, m.forces, w.z, w.memory)
+    if m.gaps.size > 0:
+        derive(tile, m.derived, w.z, m.unknowns, m.force_rows, False)
+        forces.remember(tile, m.gaps.measures, w.z, w.gaps.memory)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)

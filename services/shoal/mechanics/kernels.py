@@ -21,7 +21,7 @@ from shoal.compile import function_pointers, locks
 from shoal.compile.function_pointers import call
 from shoal.compile.pointers import raw_type
 from shoal.compile.structures import Reference, leading, storage
-from shoal.mechanics import dynamics
+from shoal.mechanics import contact, dynamics
 from shoal.mechanics.dynamics import ACCELERATION, ALL, ELASTIC, SIMPLE, Work, instant
 from shoal.mechanics.elements import families
 from shoal.mechanics.least import drift, principle
@@ -83,6 +83,8 @@ def settle(
         ready = found and m.table.sought == 0 and m.method == PROJECTION
         arguments = (m, w, t, tolerance, iterations, ready)
         call(m.table.settle, (tile, *arguments))
+    if m.gaps.size > 0:
+        call(m.table.hold, (tile, m, w, t, tolerance))
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -117,6 +119,38 @@ def _least(tile, m, w, t, z, zdot, tolerance, a):  # type: ignore[no-untyped-def
     principle.constrain(tile, m, w.gauss, t, z, zdot, a, tolerance)
 
 
+@njit(cache=True, error_model="numpy", forceinline=True)
+def look(tile: Tile, m: Arrays, w: Work, z: Array, zdot: Array) -> None:
+    """`contact.look`."""
+    call(m.table.look, (tile, m, w, z, zdot))
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def decide(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float) -> None:
+    """`contact.decide`."""
+    call(m.table.decide, (tile, m, w, t, tolerance))
+
+
+@njit(cache=True, error_model="numpy")
+def _look(tile, m, w, z, zdot):  # type: ignore[no-untyped-def]
+    contact.look(tile, m, w, z, zdot)
+
+
+@njit(cache=True, error_model="numpy")
+def _contact(tile, m, w, t, z, zdot, tolerance, a):  # type: ignore[no-untyped-def]
+    contact.accelerate(tile, m, w, t, z, zdot, tolerance, a)
+
+
+@njit(cache=True, error_model="numpy")
+def _hold(tile, m, w, t, tolerance):  # type: ignore[no-untyped-def]
+    contact.settle(tile, m, w, t, tolerance)
+
+
+@njit(cache=True, error_model="numpy")
+def _decide(tile, m, w, t, tolerance):  # type: ignore[no-untyped-def]
+    contact.decide(tile, m, w, t, tolerance)
+
+
 @njit(cache=True, error_model="numpy")
 def _force(tile, family, z, zdot, f, w, power, moving):  # type: ignore[no-untyped-def]
     families.add_force(tile, family, z, zdot, f, w, power, moving)
@@ -144,9 +178,17 @@ _STATE_KERNELS: dict[str, Kernel] = {
     "constrain": (_constrain, (_NUMBER, _ROWS, _ROWS, _NUMBER, _ROWS)),
     "least": (_least, (_NUMBER, _ROWS, _ROWS, _NUMBER, _ROWS)),
     "settle": (_settle, (_NUMBER, _NUMBER, _COUNT, _FLAG)),
+    "look": (_look, (_ROWS, _ROWS)),
+    "contact": (_contact, (_NUMBER, _ROWS, _ROWS, _NUMBER, _ROWS)),
+    "hold": (_hold, (_NUMBER, _NUMBER)),
+    "decide": (_decide, (_NUMBER, _NUMBER)),
 }
 """Kernels of a whole state in the order of `FunctionTable`, and the types of their arguments after the tile and the two
 structures."""
+_FREE, _CONSTRAINED = ("motion", "energies"), ("constrain", "least", "settle")
+_CONTACTS = ("look", "contact", "hold", "decide")
+_USUAL = (*_FREE, *_CONSTRAINED)
+"""Those of all machines, of those with constraints, and of those with gaps; the first two are compiled beforehand."""
 _OF_CONSTRAINTS = ("least", "settle")
 """Those that are the same in the plane and in space."""
 _FAMILY_KERNELS: dict[str, Kernel] = {
@@ -159,13 +201,13 @@ _FAMILY_KERNELS: dict[str, Kernel] = {
 
 locks.install()
 _FOUND: dict[tuple[Any, ...], int] = {}
-_READY: dict[tuple[int, int, bool, tuple[bool, ...]], FunctionTable] = {}
+_READY: dict[tuple[int, int, bool, bool, tuple[bool, ...]], FunctionTable] = {}
 
 
 def ready(tile: Tile, arrays: Arrays, room: Work) -> Arrays:
     """Return the same arrays with storage of their own and pointers to the kernels that they call."""
     acting = tuple(family.size > 0 for family in arrays.elements)
-    key = len(tile), len(arrays.space), arrays.constraints.size > 0, acting
+    key = len(tile), len(arrays.space), arrays.constraints.size > 0, arrays.gaps.size > 0, acting
     if key not in _READY:
         wanted = _wanted(arrays)
         state = [_address(name, tile, arrays, room) if name in wanted else 0 for name in _STATE_KERNELS]
@@ -185,14 +227,15 @@ def signatures(tile: Tile, arrays: Arrays, room: Work, *, every: bool = False) -
 
     every: the kernels of any model, for one lane those of damping as well, for small motions
     """
-    found = [_kernel(name, tile, arrays, room) for name in (_STATE_KERNELS if every else _wanted(arrays))]
+    found = [_kernel(name, tile, arrays, room) for name in (_USUAL if every else _wanted(arrays))]
     elements = [family for family in arrays.elements if every or family.size > 0]
     names = list(_FAMILY_KERNELS) if every and tile == SINGLE else ["force", "energy", "stiffness"]
     return found + [_kernel(name, tile, one) for name in names for one in elements]
 
 
 def _wanted(arrays: Arrays) -> tuple[str, ...]:
-    return tuple(_STATE_KERNELS) if arrays.constraints.size > 0 else ("motion", "energies")
+    constrained = _CONSTRAINED if arrays.constraints.size > 0 else ()
+    return *_FREE, *constrained, *(_CONTACTS if arrays.gaps.size > 0 else ())
 
 
 def _kernel(name: str, tile: Tile, *parts: Any) -> Kernel:

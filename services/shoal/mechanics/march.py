@@ -22,6 +22,7 @@ from numba import carray, njit
 from shoal.compile import function_pointers, simd, structures
 from shoal.compile.pointers import pointer
 from shoal.mechanics import constraints, kernels
+from shoal.mechanics import contact_events as events
 from shoal.mechanics.derived import derive
 from shoal.mechanics.dynamics import Work, loaded, remember
 from shoal.mechanics.halts import RESOLUTION, Halts, elongations, leapt
@@ -32,6 +33,7 @@ from shoal.mechanics.marched import (
     CUTS,
     DONE,
     ENDING,
+    EVENT,
     HALT,
     NOW,
     NUMBER,
@@ -58,6 +60,8 @@ CHECK_EVERY = 4
 """An adaptive run is looked at every so many steps, each of which is worth a dozen looks."""
 PAUSE = 0.1
 """After about so long [s] the compiled loop returns: unnoticed by who waits, and beside it the return takes no time."""
+AIMS = 3
+"""At most so often a step is aimed at an event: its dense output is of lower order than its end."""
 GROWTH = 4.0
 """Largest ratio of the numbers of steps until one return and until the next."""
 CREEPING = 10.0
@@ -162,6 +166,9 @@ def loop(frame):  # type: ignore[no-untyped-def]
         own[DONE] = 1.0 if number == steps or now >= ending else own[DONE]
         if own[DONE] > 0.0 or number + cuts >= room:
             break
+        if own[EVENT] > 0.0:
+            own[EVENT] = 0.0
+            _leave_event(tile, scheme, m, w, k, now, tolerance, record.energy_scale)
         if halt <= last and now == halts.times[halt]:
             halt += 1
             w.until[0] = np.nextafter(halts.times[halt], 0.0) if halt <= last else np.inf
@@ -173,7 +180,7 @@ def loop(frame):  # type: ignore[no-untyped-def]
         rest = step if whole and not (free or halted) else target - now
         sampling = sample < len(times) and (free or times[sample] < now + step * (1 - 1e-9))
         begin = now
-        taken = _advance(tile, scheme, m, w, k, halts, now, rest, snap, sampling)
+        taken = _advance(tile, scheme, m, w, k, halts, now, rest, snap, tolerance, sampling)
         arrived = taken >= rest
         if free:
             number += 1
@@ -218,6 +225,8 @@ def _begin(tile: Tile, m: Arrays, w: Work, k: LoopRoom, record: Marched, marker_
     _count_turns(tile, m, w, k, marker_rows)
     for i in range(marker_rows.size // (2 * len(m.space)) * len(tile)):
         k.turns[i] = 0.0
+    if m.gaps.size > 0:
+        k.progress[EVENT] = events.touching(tile, m, w)
 
 
 @njit(cache=True, error_model="numpy")
@@ -283,6 +292,22 @@ def _leave_halt(
         k.last_power[lane] = w.power[lane]
 
 
+@njit(cache=True, error_model="numpy")
+def _leave_event(
+    tile: Tile, scheme: Scheme, m: Arrays, w: Work, k: LoopRoom, now: float, tolerance: float, scale: Array
+) -> None:
+    """Go on from an event of contacts: an impact takes its energy."""
+    restart(scheme)
+    _energy(tile, m, w, k.energy, scale)
+    for lane in range(len(tile)):
+        k.dissipated[lane] += k.energy[lane]
+    kernels.decide(tile, m, w, now, tolerance)
+    _energy(tile, m, w, k.energy, scale)
+    for lane in range(len(tile)):
+        k.dissipated[lane] -= k.energy[lane]
+        k.last_power[lane] = w.power[lane]
+
+
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _advance(
     tile: Tile,
@@ -294,6 +319,7 @@ def _advance(
     now: float,
     rest: float,
     snap: float,
+    tolerance: float,
     keep: bool,
 ) -> float:
     """One step of at most `rest` [s], shorter where it would leap over a part of a force law; returns its length.
@@ -302,24 +328,40 @@ def _advance(
     """
     end = m.unknowns * len(tile)
     watched = halts.marks.size > 0
-    if keep or watched or (scheme.adaptive and loaded(m)):
+    if keep or watched or m.gaps.size > 0 or (scheme.adaptive and loaded(m)):
         for i in range(end):
             k.past[i], k.past[end + i], k.past[2 * end + i] = w.z[i], w.zdot[i], w.a[i]
     if watched:
         derive(tile, m.derived, w.z, m.unknowns, m.force_rows, False)
         elongations(tile, m.forces, w.z, w.memory, w.element, k.elongation)
-    taken: float = rest
+    taken, aims = float(rest), 0
+    if m.gaps.size > 0:
+        events.begin(tile, m, w)
     while True:
-        taken = advance(tile, scheme, m, w, now, taken)
-        if not watched or taken <= snap:
-            return taken
-        derive(tile, m.derived, w.z, m.unknowns, m.force_rows, False)
-        if not leapt(tile, m.forces, halts, k.elongation, w.z, w.memory, w.element):
-            return taken
+        asked = taken
+        taken = advance(tile, scheme, m, w, now, asked)
+        again, aims = taken, aims if taken >= asked else 0
+        if watched and taken > snap:
+            derive(tile, m.derived, w.z, m.unknowns, m.force_rows, False)
+            if leapt(tile, m.forces, halts, k.elongation, w.z, w.memory, w.element):
+                again, aims = 0.5 * taken, 0
+        if m.gaps.size > 0 and again == taken:
+            if aims == 0:
+                found = events.first(tile, scheme, m, w, k, now, taken, tolerance)
+                if found <= 1.0:
+                    again, aims = found * taken, 1
+            elif aims <= AIMS:
+                again, aims = min(taken + events.miss(tile, m, w), rest), aims + 1
+        if again == taken:
+            if m.gaps.size > 0:
+                k.progress[EVENT] = 1.0 if aims > 0 else 0.0
+            return taken  # type: ignore[no-any-return]
         for i in range(end):
             w.z[i], w.zdot[i], w.a[i] = k.past[i], k.past[end + i], k.past[2 * end + i]
+        if m.gaps.size > 0 and aims <= 1:
+            events.begin(tile, m, w)
         restart(scheme)
-        taken *= 0.5
+        taken = again
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)

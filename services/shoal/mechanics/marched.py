@@ -18,11 +18,12 @@ from shoal.mechanics.numerics.tile import Array, Index, Tile
 
 TURN = 2.0 * np.pi
 
-BEGUN, DONE, ROOM, NOW, ENDING, TAKEN, WHOLE, NUMBER, CUTS, SAMPLE, HALT = range(11)
+BEGUN, DONE, ROOM, NOW, ENDING, TAKEN, WHOLE, NUMBER, CUTS, SAMPLE, HALT, EVENT = range(12)
 """Progress of the loop: whether it has begun and is done; after how many more steps it returns; the time that it has
 reached and at which it ends [s]; the length of the last step [s], and whether that led to a whole step of a fixed
-length; and the numbers of whole steps, of others, of samples and of halts so far."""
-PROGRESS = 11
+length; the numbers of whole steps, of others, of samples and of halts so far; and whether the last step ended at an
+event of a contact."""
+PROGRESS = 12
 
 
 class Marched(NamedTuple):
@@ -51,7 +52,7 @@ class Marched(NamedTuple):
 class LoopRoom(NamedTuple):
     """State of the loop between steps.
 
-    past: coordinates, rates and accelerations at the beginning of the step, (3 * unknowns, lanes). q, v: the motion
+    past: coordinates, rates and accelerations at the beginning of the step, (3 * unknowns, lanes). q, v, a: the motion
     inside it, (rows, lanes). turns [rad], above: whole turns of every marker's direction, and on which side of the x
     axis it was, (markers, lanes). energy, start, dissipated [J], power, last_power [W]: (lanes,). gap, elongation: by
     constraint and by force element. progress: where the loop goes on, see `BEGUN`.
@@ -60,6 +61,7 @@ class LoopRoom(NamedTuple):
     past: Array
     q: Array
     v: Array
+    a: Array
     turns: Array
     above: Array
     energy: Array
@@ -104,6 +106,7 @@ def rooms(tile: Tile, arrays: Arrays, times: int, marker_rows: Index) -> tuple[M
         np.empty(3 * end),
         np.zeros(rows),
         np.zeros(rows),
+        np.zeros(rows if arrays.gaps.size else 0),
         np.zeros(markers * width),
         np.zeros(markers * width),
         np.zeros(width),

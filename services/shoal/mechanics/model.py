@@ -24,6 +24,7 @@ from shoal.mechanics.derived import Derived
 from shoal.mechanics.forces import LAW, STIFFNESS, Forces
 from shoal.mechanics.frames import Frame, ModalFrame
 from shoal.mechanics.functions import Functions, Piecewise
+from shoal.mechanics.gaps import Gaps
 from shoal.mechanics.independent import independent_rows
 from shoal.mechanics.numerics import alike, sparse
 from shoal.mechanics.numerics.alike import Alike
@@ -46,6 +47,10 @@ class FunctionTable(NamedTuple):
     constrain: int
     least: int
     settle: int
+    look: int
+    contact: int
+    hold: int
+    decide: int
     force: Index
     energy: Index
     sought: int = 0
@@ -87,6 +92,7 @@ class Arrays(NamedTuple):
     elements: tuple[Any, ...]
     forces: Forces
     applied: Applied
+    gaps: Gaps
 
 
 COMMON = Arrays._fields.index("space")
@@ -104,7 +110,8 @@ class Model:
 
     q0, v0: initial coordinates and rates, (unknowns, lanes). Arrays of lane-dependent numbers are
     (rows, lanes) or (rows, 1). start_angles: relative angles at the start that angle forces count
-    their turns from [rad], (forces, lanes) or (forces, 1). kinks: of every function, where it or a derivative jumps.
+    their turns from [rad], (forces, lanes) or (forces, 1); gap_angles: the same of gaps, (gaps, lanes) or (gaps, 1);
+    gap_names: of their joints. kinks: of every function, where it or a derivative jumps.
     owners: for each family of elements the body of every element. failed: lanes whose start contradicts the joints,
     (lanes,) or (1,). frames: kinematics of the bodies. mass_entries, lent_entries, stretching_entries: the lower
     triangles of the mass matrix, of the mass added to thin bodies, and of the rods' stiffness against stretching, see
@@ -135,6 +142,9 @@ class Model:
     forces: Forces
     start_angles: Array
     applied: Applied
+    gaps: Gaps
+    gap_names: tuple[str, ...]
+    gap_angles: Array
     functions: Functions
     kinks: tuple[Array, ...]
     constraints: Constraints
@@ -151,7 +161,7 @@ class Model:
     @property
     def varies(self) -> bool:
         """Return whether lanes differ in more than their initial state."""
-        parts = self.derived, self.elements, self.forces, self.applied, self.constraints, self.rubbing
+        parts = self.derived, self.elements, self.forces, self.applied, self.gaps, self.constraints, self.rubbing
         return varies((self.mass_values, self.weight, *parts))
 
     @property
@@ -271,12 +281,12 @@ class Model:
         weightless = ~known | (np.where(known, inverse, 0.0) * whole >= _SINGULAR)
         if np.any(weightless):
             raise self._singular({*(np.flatnonzero(weightless) // len(tile)).tolist()})
-        forces = self.elements, self.forces, self.applied
+        forces = self.elements, self.forces, self.applied, self.gaps
         parts = self.functions, self.constraints, self._saddle, self.rubbing, (0,) * self.dimensions, *forces
         nobody = np.zeros(len(self.elements), dtype=np.int64)
         return Arrays(
             structures.storage(),
-            FunctionTable(0, 0, 0, 0, 0, nobody, nobody),
+            FunctionTable(0, 0, 0, 0, 0, 0, 0, 0, 0, nobody, nobody),
             self.unknowns,
             self.force_rows,
             self.held_rows,

@@ -105,6 +105,7 @@ class Runs:
         numbers = np.empty((NUMBERS, moved.lanes))
         limits, floor = self._limits, self._limits.energy_floor(end)
         left: list[tuple[Array, Array, Array]] = []
+        happened: list[dict[str, Any]] = []
         states, stop = States.room(moved, len(times)) if whole else None, Event()
 
         def march(part: slice) -> None:
@@ -120,6 +121,7 @@ class Runs:
             reduce_record(record, len(tile), part.start, turns, limits.anchors, floor, limits.span, motion, numbers)
             if single:
                 left.append(space.left)
+                happened.extend(space.events)
             if single not in self._found:
                 self._found[single] = pickle.dumps(self._facts(record.begin if single else None))
             if seek is None and self._alike and space.size <= LARGEST:
@@ -145,6 +147,8 @@ class Runs:
         largest = np.maximum.reduce(numbers, axis=1)
         facts = pickle.loads(self._found[single])
         facts["evaluations"] = int(largest[EVALUATIONS])
+        if self.model.gaps.size and single:
+            facts["events"] = happened
         if largest[CLOSENESS] > 0.0:
             facts["distance_from_singular"] = float(largest[CLOSENESS] ** -0.5)
         ended = Ended(moved, end, *left[0], motion[-1, :, d, 0].copy()) if left and not any(findings) else None

@@ -43,6 +43,10 @@ def put_at_start(model: Model, tile: Tile, part: slice, arrays: Arrays, room: Wo
     if model.forces.size:
         derived_rows(tile, arrays, room)
         room.memory[:] = forces.initial_memory(tile, arrays.forces, room.z, pack(model.start_angles, part, tile))
+    if model.gaps.size:
+        derived_rows(tile, arrays, room)
+        start = pack(model.gap_angles, part, tile)
+        room.gaps.memory[:] = forces.initial_memory(tile, arrays.gaps.measures, room.z, start)
 
 
 def lean(arrays: Arrays, room: Work) -> Work:
@@ -82,6 +86,10 @@ class Workspace:
                 "solver.acceleration: swarms know no friction by the forces of joints (mu); use projection"
             )
         self._model, self._part, self._tile = model, part, tile
+        if seek is not None and model.gaps.size:
+            raise InputError(
+                f"solver.acceleration: swarms know no contacts, as of joints.{model.gap_names[0]}.stops; use projection"
+            )
         arrays, room = at_start(model, tile, part)
         if seek is None and facts(choice.name).sparse_constraints:
             room = lean(arrays, room)
@@ -108,6 +116,20 @@ class Workspace:
     def size(self) -> int:
         """Numbers that it holds."""
         return self._block.size
+
+    @property
+    def events(self) -> list[dict[str, Any]]:
+        """Impacts and openings of contacts in a march of one lane, the first `LOGGED` of them."""
+        gaps, names = self.march.frame.room.gaps, self._model.gap_names
+        if not names:
+            return []
+        log = gaps.log[: 3 * int(gaps.number[0])].reshape(-1, 3)
+        return [
+            {"time": float(t), "joint": names[int(k)], "kind": "impact", "impulse": float(push)}
+            if push >= 0
+            else {"time": float(t), "joint": names[int(k)], "kind": "opens"}
+            for t, k, push in log
+        ]
 
     @property
     def left(self) -> tuple[Array, Array, Array]:

@@ -71,6 +71,25 @@ class DirectionTie(Tie):
     """The second body."""
 
 
+class Stops(Record):
+    """Limits of the free motion of a joint, which it strikes and rests against."""
+
+    min: float | None = None
+    """Smallest angle of the second body against the first [rad; of a slider place on its line, m]."""
+    max: float | None = None
+    """Largest angle [rad; of a slider place, m]."""
+    restitution: Annotated[float, Field(ge=0, le=1)] = 0.0
+    """Rate after an impact over that before [1]: 0 of a stop that takes all, 1 of one that loses nothing."""
+
+    @model_validator(mode="after")
+    def _apart(self) -> Stops:
+        if self.min is None and self.max is None:
+            raise ValueError("min or max is missing")
+        if self.min is not None and self.max is not None and np.any(self.min >= self.max):
+            raise ValueError(f"min: must be below max, found {self.min:.6g} and {self.max:.6g}")
+        return self
+
+
 class Resisted(Tie):
     """A joint with one free motion that resists its rate: a rotation [rad/s] or a displacement [m/s]."""
 
@@ -84,6 +103,8 @@ class Resisted(Tie):
     """Rate that smooths dry friction [rad/s; of a slider m/s]."""
     mu: NonNegative = 0.0
     """Coefficient of dry friction by the joint's force [1], smoothed alike."""
+    stops: Stops | None = None
+    """Limits of its free motion."""
 
     @property
     def share(self) -> float:

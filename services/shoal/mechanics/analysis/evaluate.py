@@ -14,6 +14,7 @@ import numpy as np
 import scipy.sparse
 
 from shoal.compile import structures
+from shoal.errors import InputError
 from shoal.mechanics import forces, functions, plane
 from shoal.mechanics.analysis import evaluations
 from shoal.mechanics.analysis.load_stiffness import driven, in_plane, in_space, of_drives
@@ -65,6 +66,11 @@ class Evaluator:
     """
 
     def __init__(self, model: Model, lane: int = 0) -> None:
+        if model.gaps.size:
+            raise InputError(
+                f"joints.{model.gap_names[0]}.stops: motions take stops, but not yet equilibria, modes, reactions, "
+                "virtual sensors and starts from the end of a run"
+            )
         self.model = model
         self._arrays = model.tile(SINGLE, slice(lane, lane + 1))
         self._room = work_space(SINGLE, self._arrays)

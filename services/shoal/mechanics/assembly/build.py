@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 from shoal.compile import progress
+from shoal.errors import InputError
 from shoal.mechanics import fitting, functions, terms
 from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.assembly.loads import Loads, naming
 from shoal.mechanics.assembly.masses import Masses
 from shoal.mechanics.assembly.placement import place
+from shoal.mechanics.assembly.stops import Stops
 from shoal.mechanics.derived import RowAllocator
 from shoal.mechanics.least import principle
 from shoal.mechanics.model import Model
@@ -23,16 +25,30 @@ def with_start(model: Model, scene: Scene, lanes: int) -> Model:
     """The same model with the initial state of a scene that differs in nothing else."""
     placement = place(scene)
     stated, scene = scene, placement.scene
+    stops = _stops(scene, placement)
     return replace(
         model,
         scene=scene,
         stated=stated,
-        failed=placement.failed,
+        failed=placement.failed | stops.beyond,
         lanes=lanes,
         q0=stacked(placement.positions),
         v0=stacked(placement.velocities),
-        start_angles=stacked(Loads(scene, placement, RowAllocator(0), 0.0).angles),
+        start_angles=stacked(_loads(scene, placement).angles),
+        gap_angles=stacked(stops.angles),
     )
+
+
+def _loads(scene: Scene, placement: Placement) -> Loads:
+    loads = Loads(scene, placement, RowAllocator(0), 0.0)
+    loads.load()
+    return loads
+
+
+def _stops(scene: Scene, placement: Placement) -> Stops:
+    stops = Stops(scene, placement, RowAllocator(0), 0.0)
+    stops.gaps()
+    return stops
 
 
 def build(scene: Scene, lanes: int = 1, horizon: float = 0.0, placement: Placement | None = None) -> Model:
@@ -47,7 +63,12 @@ def build(scene: Scene, lanes: int = 1, horizon: float = 0.0, placement: Placeme
     horizon = max(horizon, scene.solver.duration)
     rows = RowAllocator(len(placement.positions))
     masses = Masses(scene, placement, rows)
-    loads = Loads(scene, placement, rows, horizon)
+    loads, stops = Loads(scene, placement, rows, horizon), Stops(scene, placement, rows, 0.0)
+    loads.load()
+    gaps = stops.gaps()
+    if gaps.size and loads.rubbing:
+        name, rubs = stops.names[0], loads.rubbing[0][0]
+        raise InputError(f"joints.{name}.stops: friction by the force of a joint (joints.{rubs}.mu) knows no stops yet")
     force_rows = rows.size
     held = terms.assemble(placement.terms, rows, len(loads.fitted), span(scene))
     for one in terms.drives(placement.terms).values():
@@ -68,7 +89,7 @@ def build(scene: Scene, lanes: int = 1, horizon: float = 0.0, placement: Placeme
         scene=scene,
         stated=stated,
         dimensions=scene.dimensions,
-        failed=placement.failed,
+        failed=placement.failed | stops.beyond,
         frames=placement.frames,
         lanes=lanes,
         q0=stacked(placement.positions),
@@ -86,6 +107,9 @@ def build(scene: Scene, lanes: int = 1, horizon: float = 0.0, placement: Placeme
         forces=loads.forces(),
         start_angles=stacked(loads.angles),
         applied=loads.applied(),
+        gaps=gaps,
+        gap_names=tuple(stops.names),
+        gap_angles=stacked(stops.angles),
         functions=functions.pack(loads.fitted),
         kinks=tuple(one.kinks for one in loads.fitted),
         constraints=held,

@@ -88,10 +88,14 @@ class Loads:
         self.following: list[tuple[list[int], Number, int]] = []
         self.turning: list[tuple[list[int], int]] = []
         self.twisting: list[tuple[list[int], int]] = []
+
+    def load(self) -> None:
+        """Measure what resists, bends and loads."""
+        scene = self.scene
         for name, joint in scene.joints.items():
             if isinstance(joint, Revolute | Slider) and joint.resists:
                 self._friction(name, joint)
-        for name, frame in placement.frames.items():
+        for name, frame in self.placement.frames.items():
             if isinstance(frame, ModalFrame):
                 self._bend(name, frame)
         for name, load in scene.loads.items():

@@ -63,6 +63,10 @@ def pick(solver: Solver, model: Model, limit: Callable[[Model, Facts], float]) -
     """
     if solver.integrator == "auto" and model.rubbing.size:
         return Choice("dop853", "auto: friction depends on the forces of joints", np.inf)
+    if solver.integrator == "auto" and model.gaps.size:
+        limit_of = limit(model, facts("leapfrog")) if model.flexible else np.inf
+        name = "leapfrog" if model.flexible else "dop853"
+        return Choice(name, "auto: events of contacts end steps of explicit integrators", limit_of)
     if solver.integrator != "auto":
         return Choice(solver.integrator, "named by the scene", limit(model, facts(solver.integrator)))
     if model.flexible == 0:
@@ -85,6 +89,10 @@ def choose(solver: Solver, model: Model, tile: Tile, lanes: slice, name: str | N
     if model.rubbing.size and not facts(name).constraint_forces:
         others = " or ".join(other for other in INTEGRATORS if facts(other).constraint_forces)
         raise InputError(f"solver.integrator: {name} knows no friction by the forces of joints (mu); use {others}")
+    if model.gaps.size and not facts(name).explicit:
+        others = " or ".join(other for other in INTEGRATORS if facts(other).explicit)
+        where = f"joints.{model.gap_names[0]}.stops"
+        raise InputError(f"solver.integrator: {name} knows no contacts, as of {where}; use {others}")
     return INTEGRATORS[name].settings(solver, model, tile, lanes)
 
 
