@@ -41,7 +41,7 @@ from click.testing import CliRunner
 from shoal.cli import main
 told = CliRunner().invoke(main, ["identify", "paper-case-1", "--json"])
 assert '"verdict": "identified"' in told.stdout, told
-lazy = ("scipy.special", "scipy.linalg", "scipy.sparse", "exudyn", "rich.progress", "numba.typed.typeddict")
+lazy = ("scipy.optimize", "scipy.stats", "scipy.integrate", "exudyn", "rich.progress", "numba.typed.typeddict")
 print([name for name in lazy if name in sys.modules])
 """
 

@@ -219,7 +219,8 @@ def test_time_that_ends_while_an_answer_is_written_up_is_no_traceback(monkeypatc
     monkeypatch.setattr(module, "combinations", late)
     found = identify(problem(), time_limit=1e3)
     assert found.verdict is Verdict.FAILED
-    assert "no-time-to-judge" in found.codes
+    (stopped,) = [one for one in found.findings if one.kind.code == "search-stopped"]
+    assert stopped.text == "no time was left to judge the answer"
     assert np.isfinite(found.fitness)
 
 

@@ -166,7 +166,7 @@ def test_a_torque_that_folds_a_rod_ends_the_search() -> None:
     machine = draw(79)
     found = select(machine.scene, machine.tolerance)
     assert not found.met
-    assert found.trajectory.message.startswith("the torque load bends A to a strain of 3.1 at its surface")
+    assert "the torque load bends A to a strain of 3.1 at its surface" in found.trajectory.message
     assert not any("reissner" in candidate.name for candidate in found.candidates)
 
 

@@ -63,7 +63,11 @@ def selection(problem: str, tolerance: float) -> Measured:
     def of_slender_rods() -> Trajectory:
         found = select(scene, tolerance, wanted.times)
         meshed = found.chosen.error <= tolerance
-        return replace(found.trajectory, lane_findings=found.chosen.trajectory.lane_findings) if meshed else found.trajectory
+        return (
+            replace(found.trajectory, lane_findings=found.chosen.trajectory.lane_findings)
+            if meshed
+            else found.trajectory
+        )
 
     return _motion(problem, of_slender_rods)
 

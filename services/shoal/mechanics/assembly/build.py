@@ -34,15 +34,9 @@ def with_start(model: Model, scene: Scene, lanes: int) -> Model:
         lanes=lanes,
         q0=stacked(placement.positions),
         v0=stacked(placement.velocities),
-        start_angles=stacked(_loads(scene, placement).angles),
+        start_angles=stacked(Loads(scene, placement, RowAllocator(0), 0.0).angles),
         gap_angles=stacked(stops.angles),
     )
-
-
-def _loads(scene: Scene, placement: Placement) -> Loads:
-    loads = Loads(scene, placement, RowAllocator(0), 0.0)
-    loads.load()
-    return loads
 
 
 def _stops(scene: Scene, placement: Placement) -> Stops:
@@ -64,7 +58,6 @@ def build(scene: Scene, lanes: int = 1, horizon: float = 0.0, placement: Placeme
     rows = RowAllocator(len(placement.positions))
     masses = Masses(scene, placement, rows)
     loads, stops = Loads(scene, placement, rows, horizon), Stops(scene, placement, rows, 0.0)
-    loads.load()
     gaps = stops.gaps()
     if gaps.size and loads.rubbing:
         name, rubs = stops.names[0], loads.rubbing[0][0]

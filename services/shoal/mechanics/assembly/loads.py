@@ -69,8 +69,8 @@ def naming(field: str) -> Iterator[None]:
         raise InputError(f"{field}: {str(error).removeprefix('function: ')}") from None
 
 
-class Loads:
-    """Springs, dampers, joint friction, forces and torques."""
+class Measures:
+    """Scalar measures of a machine and their laws, in the order of the arrays of `forces.Forces`."""
 
     def __init__(self, scene: Scene, placement: Placement, rows: RowAllocator, horizon: float) -> None:
         self.scene, self.placement, self.rows, self.horizon = scene, placement, rows, horizon
@@ -82,20 +82,96 @@ class Loads:
         self.numbers: list[list[int]] = []
         self.laws: list[Number] = []
         self.angles: list[Number] = []
+
+    def _measure(
+        self,
+        name: str,
+        kind: int,
+        vectors: list[Affine],
+        law: ElementForceLaw,
+        angle: Number,
+        *,
+        elastic: Function | None = None,
+        drive: Function | None = None,
+    ) -> None:
+        table = energy = -1
+        if elastic is not None and self.horizon > 0.0:
+            with naming(self._field(name, elastic)):
+                fitted = fitting.fit_law(elastic)
+            self.fitted += [fitting.ended(one) for one in (fitted, fitting.antiderivative(fitted))]
+            table, energy = len(self.fitted) - 2, len(self.fitted) - 1
+        driven = -1
+        if drive is not None and self.horizon > 0.0:
+            with naming(self._field(name, drive)):
+                self.fitted.append(fitting.fit(drive, self.horizon, drive.knots))
+            driven = len(self.fitted) - 1
+        vectors = [*vectors, *vectors[-1:] * (3 - len(vectors))]
+        self.kinds.append(kind)
+        self.names.append(name)
+        self.places.append(self.rows.of_all(vectors))
+        self.numbers.append([table, energy, driven])
+        self.laws += law
+        self.angles.append(angle)
+
+    def _angle(
+        self,
+        name: str,
+        first: Attachment,
+        second: Attachment,
+        law: ElementForceLaw,
+        axis: Vector3,
+        *,
+        elastic: Function | None = None,
+        drive: Function | None = None,
+    ) -> None:
+        for side in (first, second):
+            self._require_angle(name, side)
+        if isinstance(self.placement, SpatialPlacement):
+            directions = list(turning(self.scene, name, self.placement, first, second, axis))
+            a, b, ahead = (self.placement.start_of(one)[0] for one in directions)
+            turn: Number = np.arctan2(sum(ahead * b), sum(a * b))
+        else:
+            directions = [self.placement.direction(self.scene, side) for side in (first, second)]
+            turn = self._turn(first, second)
+        self._measure(name, ANGLE, directions, law, turn, elastic=elastic, drive=drive)
+
+    def _require_angle(self, name: str, side: Attachment) -> None:
+        if side.body != GROUND and isinstance(self.scene.bodies[side.body], PointMass):
+            raise InputError(
+                f"{name}: {side.body} is a point mass, which has no angle; of a torsion spring, first_to or second_to "
+                "can tell the place to which its direction leads"
+            )
+
+    def _turn(self, first: Attachment, second: Attachment) -> Number:
+        return start_angle(self.scene, second) - start_angle(self.scene, first)
+
+    def _field(self, name: str, function: Function) -> str:
+        """Return the path of a function of a load, or of the load alone if that has made it."""
+        return ".".join([f"loads.{name}", *(field for field, value in self.scene.loads[name] if value is function)])
+
+    def forces(self) -> Forces:
+        """Springs, dampers, friction and torques as arrays."""
+        table, energy, drive = np.array(self.numbers, dtype=np.int64).reshape(-1, 3).T.copy()
+        rows = index(self.places).ravel()
+        space = (0,) * self.scene.dimensions
+        return Forces(space, len(self.kinds), index(self.kinds), rows, table, energy, drive, stacked(self.laws))
+
+
+class Loads(Measures):
+    """Springs, dampers, joint friction, forces and torques."""
+
+    def __init__(self, scene: Scene, placement: Placement, rows: RowAllocator, horizon: float) -> None:
+        super().__init__(scene, placement, rows, horizon)
         self.rubbing: list[tuple[str, int, Number]] = []
         """Joints whose friction depends on their force, its element's number, and mu, of a pin times its radius."""
         self.fixed: list[tuple[int, Number, int]] = []
         self.following: list[tuple[list[int], Number, int]] = []
         self.turning: list[tuple[list[int], int]] = []
         self.twisting: list[tuple[list[int], int]] = []
-
-    def load(self) -> None:
-        """Measure what resists, bends and loads."""
-        scene = self.scene
         for name, joint in scene.joints.items():
             if isinstance(joint, Revolute | Slider) and joint.resists:
                 self._friction(name, joint)
-        for name, frame in self.placement.frames.items():
+        for name, frame in placement.frames.items():
             if isinstance(frame, ModalFrame):
                 self._bend(name, frame)
         for name, load in scene.loads.items():
@@ -202,72 +278,6 @@ class Loads:
             self.fitted.append(fitting.fit(f, self.horizon, f.knots))
         return len(self.fitted) - 1
 
-    def _field(self, name: str, function: Function) -> str:
-        """Return the path of a function of a load, or of the load alone if that has made it."""
-        return ".".join([f"loads.{name}", *(field for field, value in self.scene.loads[name] if value is function)])
-
-    def _turn(self, first: Attachment, second: Attachment) -> Number:
-        return start_angle(self.scene, second) - start_angle(self.scene, first)
-
-    def _measure(
-        self,
-        name: str,
-        kind: int,
-        vectors: list[Affine],
-        law: ElementForceLaw,
-        angle: Number,
-        *,
-        elastic: Function | None = None,
-        drive: Function | None = None,
-    ) -> None:
-        table = energy = -1
-        if elastic is not None and self.horizon > 0.0:
-            with naming(self._field(name, elastic)):
-                fitted = fitting.fit_law(elastic)
-            self.fitted += [fitting.ended(one) for one in (fitted, fitting.antiderivative(fitted))]
-            table, energy = len(self.fitted) - 2, len(self.fitted) - 1
-        driven = -1
-        if drive is not None and self.horizon > 0.0:
-            with naming(self._field(name, drive)):
-                self.fitted.append(fitting.fit(drive, self.horizon, drive.knots))
-            driven = len(self.fitted) - 1
-        vectors = [*vectors, *vectors[-1:] * (3 - len(vectors))]
-        self.kinds.append(kind)
-        self.names.append(name)
-        self.places.append(self.rows.of_all(vectors))
-        self.numbers.append([table, energy, driven])
-        self.laws += law
-        self.angles.append(angle)
-
-    def _angle(
-        self,
-        name: str,
-        first: Attachment,
-        second: Attachment,
-        law: ElementForceLaw,
-        axis: Vector3,
-        *,
-        elastic: Function | None = None,
-        drive: Function | None = None,
-    ) -> None:
-        for side in (first, second):
-            self._require_angle(name, side)
-        if isinstance(self.placement, SpatialPlacement):
-            directions = list(turning(self.scene, name, self.placement, first, second, axis))
-            a, b, ahead = (self.placement.start_of(one)[0] for one in directions)
-            turn: Number = np.arctan2(sum(ahead * b), sum(a * b))
-        else:
-            directions = [self.placement.direction(self.scene, side) for side in (first, second)]
-            turn = self._turn(first, second)
-        self._measure(name, ANGLE, directions, law, turn, elastic=elastic, drive=drive)
-
-    def _require_angle(self, name: str, side: Attachment) -> None:
-        if side.body != GROUND and isinstance(self.scene.bodies[side.body], PointMass):
-            raise InputError(
-                f"{name}: {side.body} is a point mass, which has no angle; of a torsion spring, first_to or second_to "
-                "can tell the place to which its direction leads"
-            )
-
     def _spring(self, name: str, load: Spring) -> None:
         ends = [self.placement.point(self.scene, side) for side in (load.first, load.second)]
         rest: Number = load.length
@@ -310,13 +320,6 @@ class Loads:
             loads = [(frame.point(place), w / 2 * rod.length) for place, w in zip(axis, weights, strict=True)]
         for vector, size in loads:
             self._fix(vector, tuple(part * size for part in padded(load.force, self.scene.dimensions)), number)
-
-    def forces(self) -> Forces:
-        """Springs, dampers, friction and torques as arrays."""
-        table, energy, drive = np.array(self.numbers, dtype=np.int64).reshape(-1, 3).T.copy()
-        rows = index(self.places).ravel()
-        space = (0,) * self.scene.dimensions
-        return Forces(space, len(self.kinds), index(self.kinds), rows, table, energy, drive, stacked(self.laws))
 
     def applied(self) -> Applied:
         """Applied loads as arrays."""

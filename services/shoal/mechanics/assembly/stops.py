@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from shoal.errors import InputError
-from shoal.mechanics.assembly.loads import ElementForceLaw, Loads
+from shoal.mechanics.assembly.loads import ElementForceLaw, Measures
 from shoal.mechanics.forces import PLACE
 from shoal.mechanics.gaps import Gaps
 from shoal.mechanics.numerics.tile import Number, stacked
@@ -21,7 +21,7 @@ BEYOND = 1e-6
 LOWER, UPPER = 1.0, -1.0
 
 
-class Stops(Loads):
+class Stops(Measures):
     """Measures of stops: each is a force element without a force, whose natural value is the limit."""
 
     beyond: Any = np.zeros(1, dtype=bool)
