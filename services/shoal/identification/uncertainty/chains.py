@@ -6,9 +6,6 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.fft import irfft, next_fast_len, rfft
-from scipy.special import ndtri
-from scipy.stats import rankdata
 
 from shoal.errors import InputError
 from shoal.trajectory import Array
@@ -177,12 +174,17 @@ def _halves(draws: Array) -> Array:
 
 def _scores(draws: Array) -> Array:
     """Normal scores of the ranks (Blom 1958)."""
+    from scipy.special import ndtri
+    from scipy.stats import rankdata  # a second to import
+
     ranks = rankdata(draws, axis=None).reshape(draws.shape)
     return np.asarray(ndtri((ranks - 0.375) / (draws.size + 0.25)))
 
 
 def _autocovariance(chains: Array) -> Array:
     """Autocovariance of every row, (rows, steps), over the number of steps."""
+    from scipy.fft import irfft, next_fast_len, rfft
+
     steps = chains.shape[1]
     room = next_fast_len(2 * steps)
     found = rfft(chains - chains.mean(axis=1, keepdims=True), room, axis=1)
