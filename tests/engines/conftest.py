@@ -408,6 +408,13 @@ ONLY_NATIVE = [
     pendulum("quintic", CABLE | {"element": "ancf-quintic"}),
     pendulum("full", CABLE | {"element": "ancf-full"}),
     pendulum("dry-pin", joints={"O": PIN["O"] | {"mu": 0.1, "radius": 0.01}}),
+    scene(
+        "roped",
+        {"A": {"kind": "point-mass", "mass": 1.0}},
+        {"rope": {"kind": "distance", "keeps": "at-most", "first": GROUND, "second": at("A")}},
+        {"A": at("A")},
+        initial={"A": {"position": [0.6, -0.8], "velocity": [0.0, 0.0]}},
+    ),
     pendulum("stopped", joints={"O": PIN["O"] | {"stops": {"min": -4.0, "restitution": 0.5}}}),
     scene(
         "hose",

@@ -207,12 +207,14 @@ def test_a_stop_that_is_none_is_refused_by_name(stops: str) -> None:
 
 
 def test_a_start_beyond_a_stop_is_refused_by_name() -> None:
-    with pytest.raises(InputError, match=r"joints\.O\.stops\.min: the machine starts beyond this stop, at -1\.5"):
+    with pytest.raises(InputError, match=r"joints\.O\.stops\.min: the machine starts beyond this limit, at -1\.5"):
         simulate(rod().with_values({"initial.B.angle": -1.5}), np.array([1.0]))
 
 
 def test_what_knows_no_stops_says_so() -> None:
-    with pytest.raises(InputError, match=r"joints\.O\.stops: motions take stops, but not yet equilibria"):
+    with pytest.raises(
+        InputError, match=r"joints\.O\.stops: motions take one-sided constraints, but not yet equilibria"
+    ):
         statics(rod())
     with pytest.raises(InputError, match=r"solver\.integrator: radau5 knows no contacts, as of joints\.O\.stops"):
         simulate(rod(integrator="radau5"), np.array([1.0]))

@@ -34,6 +34,7 @@ FEATURES = (
     "damped flexible rods",
     "damped rods in space",
     "stops",
+    "one-sided distances",
 )
 _FIELDS = {
     "coulomb": "dry friction",
@@ -87,6 +88,8 @@ def _item(where: str, item: Joint | Load) -> Iterator[tuple[str, str]]:
     """The kind of a joint or a load, and what its fields need beyond that."""
     yield where, item.kind
     for field, value in item:
+        if field == "keeps" and value != "exactly":
+            yield f"{where}.keeps", "one-sided distances"
         if field in _FIELDS and value:
             yield f"{where}.{field}", _FIELDS[field]
         if isinstance(value, Function) and (value.number is None or field == "elastic"):

@@ -334,7 +334,7 @@ CONDITIONS: dict[type, Callable[[Any], list[JointCondition]]] = {
     Revolute: lambda joint: [Meet(joint.first, joint.second, bool(np.any(joint.mu)))],
     Weld: lambda joint: [Meet(joint.first, joint.second), Turned(joint.first, joint.second, joint.angle)],
     Slider: _slider,
-    Distance: lambda joint: [Apart(joint.first, joint.second, joint.length)],
+    Distance: lambda joint: [Apart(joint.first, joint.second, joint.length)] if joint.keeps == "exactly" else [],
     Parallel: lambda joint: [Turned(joint.first, joint.second, either=(0.0, np.pi))],
     Perpendicular: lambda joint: [Turned(joint.first, joint.second, either=(np.pi / 2, -np.pi / 2))],
     DrivenAngle: lambda joint: [Turned(joint.first, joint.second, joint.angle)],

@@ -111,7 +111,7 @@ class Model:
     q0, v0: initial coordinates and rates, (unknowns, lanes). Arrays of lane-dependent numbers are
     (rows, lanes) or (rows, 1). start_angles: relative angles at the start that angle forces count
     their turns from [rad], (forces, lanes) or (forces, 1); gap_angles: the same of gaps, (gaps, lanes) or (gaps, 1);
-    gap_names: of their joints. kinks: of every function, where it or a derivative jumps.
+    gap_fields: what states them. kinks: of every function, where it or a derivative jumps.
     owners: for each family of elements the body of every element. failed: lanes whose start contradicts the joints,
     (lanes,) or (1,). frames: kinematics of the bodies. mass_entries, lent_entries, stretching_entries: the lower
     triangles of the mass matrix, of the mass added to thin bodies, and of the rods' stiffness against stretching, see
@@ -143,7 +143,7 @@ class Model:
     start_angles: Array
     applied: Applied
     gaps: Gaps
-    gap_names: tuple[str, ...]
+    gap_fields: tuple[str, ...]
     gap_angles: Array
     functions: Functions
     kinks: tuple[Array, ...]

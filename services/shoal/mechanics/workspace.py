@@ -88,7 +88,7 @@ class Workspace:
         self._model, self._part, self._tile = model, part, tile
         if seek is not None and model.gaps.size:
             raise InputError(
-                f"solver.acceleration: swarms know no contacts, as of joints.{model.gap_names[0]}.stops; use projection"
+                f"solver.acceleration: swarms know no contacts, as of {model.gap_fields[0]}; use projection"
             )
         arrays, room = at_start(model, tile, part)
         if seek is None and facts(choice.name).sparse_constraints:
@@ -120,7 +120,8 @@ class Workspace:
     @property
     def events(self) -> list[dict[str, Any]]:
         """Impacts and openings of contacts in a march of one lane, the first `LOGGED` of them."""
-        gaps, names = self.march.frame.room.gaps, self._model.gap_names
+        gaps = self.march.frame.room.gaps
+        names = [field.split(".")[1] for field in self._model.gap_fields]
         if not names:
             return []
         log = gaps.log[: 3 * int(gaps.number[0])].reshape(-1, 3)

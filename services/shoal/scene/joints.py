@@ -230,12 +230,24 @@ class Slider(Resisted):
 
 
 class Distance(Tie):
-    """Two places keep a distance."""
+    """Two places keep a distance, or stay within it as with a rope, or beyond it as with a strut that pushes only."""
 
     kind: Literal["distance"] = "distance"
     turned: ClassVar[tuple[str, ...]] = ()
     length: Function | None = None
     """Distance [m] as a function of time; by default that of the start."""
+    keeps: Literal["exactly", "at-most", "at-least"] = "exactly"
+    """Whether the length is that of a bar, the largest (a rope), or the smallest (a strut)."""
+    restitution: Annotated[float, Field(ge=0, le=1)] = 0.0
+    """Rate after a rope is taut, or a strut touches, over that before [1]."""
+
+    @model_validator(mode="after")
+    def _one_sided(self) -> Distance:
+        if self.keeps == "exactly" and np.any(self.restitution):
+            raise ValueError("restitution: a bar has none; only what keeps at-most or at-least")
+        if self.keeps != "exactly" and self.length is not None and self.length.number is None:
+            raise ValueError(f"length: of what keeps {self.keeps} it is a number, not a function of time")
+        return self
 
 
 class Parallel(DirectionTie):

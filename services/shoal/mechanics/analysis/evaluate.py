@@ -68,7 +68,7 @@ class Evaluator:
     def __init__(self, model: Model, lane: int = 0) -> None:
         if model.gaps.size:
             raise InputError(
-                f"joints.{model.gap_names[0]}.stops: motions take stops, but not yet equilibria, modes, reactions, "
+                f"{model.gap_fields[0]}: motions take one-sided constraints, but not yet equilibria, modes, reactions, "
                 "virtual sensors and starts from the end of a run"
             )
         self.model = model

@@ -10,8 +10,8 @@ from shoal.mechanics import fitting, functions, terms
 from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.assembly.loads import Loads, naming
 from shoal.mechanics.assembly.masses import Masses
+from shoal.mechanics.assembly.one_sided import OneSided
 from shoal.mechanics.assembly.placement import place
-from shoal.mechanics.assembly.stops import Stops
 from shoal.mechanics.derived import RowAllocator
 from shoal.mechanics.least import principle
 from shoal.mechanics.model import Model
@@ -25,24 +25,24 @@ def with_start(model: Model, scene: Scene, lanes: int) -> Model:
     """The same model with the initial state of a scene that differs in nothing else."""
     placement = place(scene)
     stated, scene = scene, placement.scene
-    stops = _stops(scene, placement)
+    sided = _one_sided(scene, placement)
     return replace(
         model,
         scene=scene,
         stated=stated,
-        failed=placement.failed | stops.beyond,
+        failed=placement.failed | sided.beyond,
         lanes=lanes,
         q0=stacked(placement.positions),
         v0=stacked(placement.velocities),
         start_angles=stacked(Loads(scene, placement, RowAllocator(0), 0.0).angles),
-        gap_angles=stacked(stops.angles),
+        gap_angles=stacked(sided.angles),
     )
 
 
-def _stops(scene: Scene, placement: Placement) -> Stops:
-    stops = Stops(scene, placement, RowAllocator(0), 0.0)
-    stops.gaps()
-    return stops
+def _one_sided(scene: Scene, placement: Placement) -> OneSided:
+    sided = OneSided(scene, placement, RowAllocator(0), 0.0)
+    sided.gaps()
+    return sided
 
 
 def build(scene: Scene, lanes: int = 1, horizon: float = 0.0, placement: Placement | None = None) -> Model:
@@ -57,11 +57,13 @@ def build(scene: Scene, lanes: int = 1, horizon: float = 0.0, placement: Placeme
     horizon = max(horizon, scene.solver.duration)
     rows = RowAllocator(len(placement.positions))
     masses = Masses(scene, placement, rows)
-    loads, stops = Loads(scene, placement, rows, horizon), Stops(scene, placement, rows, 0.0)
-    gaps = stops.gaps()
+    loads, sided = Loads(scene, placement, rows, horizon), OneSided(scene, placement, rows, 0.0)
+    gaps = sided.gaps()
     if gaps.size and loads.rubbing:
-        name, rubs = stops.names[0], loads.rubbing[0][0]
-        raise InputError(f"joints.{name}.stops: friction by the force of a joint (joints.{rubs}.mu) knows no stops yet")
+        raise InputError(
+            f"{sided.fields[0]}: friction by the force of a joint (joints.{loads.rubbing[0][0]}.mu) knows "
+            "no one-sided constraints yet"
+        )
     force_rows = rows.size
     held = terms.assemble(placement.terms, rows, len(loads.fitted), span(scene))
     for one in terms.drives(placement.terms).values():
@@ -82,7 +84,7 @@ def build(scene: Scene, lanes: int = 1, horizon: float = 0.0, placement: Placeme
         scene=scene,
         stated=stated,
         dimensions=scene.dimensions,
-        failed=placement.failed | stops.beyond,
+        failed=placement.failed | sided.beyond,
         frames=placement.frames,
         lanes=lanes,
         q0=stacked(placement.positions),
@@ -101,8 +103,8 @@ def build(scene: Scene, lanes: int = 1, horizon: float = 0.0, placement: Placeme
         start_angles=stacked(loads.angles),
         applied=loads.applied(),
         gaps=gaps,
-        gap_names=tuple(stops.names),
-        gap_angles=stacked(stops.angles),
+        gap_fields=tuple(sided.fields),
+        gap_angles=stacked(sided.angles),
         functions=functions.pack(loads.fitted),
         kinks=tuple(one.kinks for one in loads.fitted),
         constraints=held,

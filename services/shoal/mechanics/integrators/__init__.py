@@ -91,8 +91,7 @@ def choose(solver: Solver, model: Model, tile: Tile, lanes: slice, name: str | N
         raise InputError(f"solver.integrator: {name} knows no friction by the forces of joints (mu); use {others}")
     if model.gaps.size and not facts(name).explicit:
         others = " or ".join(other for other in INTEGRATORS if facts(other).explicit)
-        where = f"joints.{model.gap_names[0]}.stops"
-        raise InputError(f"solver.integrator: {name} knows no contacts, as of {where}; use {others}")
+        raise InputError(f"solver.integrator: {name} knows no contacts, as of {model.gap_fields[0]}; use {others}")
     return INTEGRATORS[name].settings(solver, model, tile, lanes)
 
 
