@@ -284,6 +284,7 @@ def test_engine_of_its_page_agrees_with_ours(tmp_path: Path) -> None:
     assert own.endswith("engine pendulum takes one body on one joint, and markers on the body")
 
 
+@pytest.mark.slow
 def test_surrogate_sampler_and_reliability_method_of_their_page_agree_with_ours(tmp_path: Path) -> None:
     program = (
         "[[[of.bounds.lower.tolist(), of.bounds.upper.tolist(), of.bounds.gap, of.why] for of in (spline, auto)], "

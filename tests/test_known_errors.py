@@ -355,7 +355,7 @@ def test_no_limit_is_called_kept_that_the_true_machine_passes(seed: int) -> None
 
 @pytest.mark.parametrize("way", ["monte-carlo", "subset"])
 @pytest.mark.parametrize("seed", [0, 1, *(pytest.param(one, marks=pytest.mark.slow) for one in range(2, 5))])
-@pytest.mark.by_day(2)
+@pytest.mark.by_day(1)
 def test_probabilities_of_every_way_are_as_wide_as_the_neglected_inertia_makes_them(way: str, seed: int) -> None:
     """Of thick rods taken for slender ones: the interval holds the probability of the true rod, by scipy.
 

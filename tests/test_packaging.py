@@ -50,6 +50,7 @@ print([name for name in {HEAVY!r} if name in sys.modules])
     assert commands == sorted(commands)
 
 
+@pytest.mark.by_day(1)
 @pytest.mark.parametrize(
     ("command", "missing", "extra"),
     [

@@ -62,6 +62,7 @@ def test_an_entry_is_put_listed_simulated_given_and_forgotten(service: httpx.Cli
     assert refused(service.post("/v1/simulate", json={"scene": "arm"}))[0] == 422
 
 
+@pytest.mark.slow
 def test_a_problem_and_a_recording_are_taken_by_name(service: httpx.Client, problem: dict[str, Any]) -> None:
     stated = {**problem, "scene": "arm", "source": {"kind": "file", "path": "run"}}
     service.put("/v1/library/scenes/arm", json=files(arm_yaml=yaml.safe_dump(problem["scene"])))

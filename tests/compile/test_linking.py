@@ -99,6 +99,7 @@ def _run(place: Path, first: str, second: str) -> list[str]:
     return _printed(place, RUN.format(first=first, second=second))
 
 
+@pytest.mark.slow
 def test_the_cache_keeps_parts_and_entries_apart(tmp_path: Path) -> None:
     """A part in the cache serves callers of other processes, and is compiled again for whoever calls it from Python."""
     (tmp_path / "kernels.py").write_text(KERNELS)

@@ -62,6 +62,7 @@ print(sum(kernels.kernel.stats.cache_misses.values()))
 """
 
 
+@pytest.mark.slow
 def test_of_two_processes_one_compiles_and_the_other_waits(tmp_path: Path) -> None:
     (tmp_path / "kernels.py").write_text(KERNEL)
     place = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}

@@ -103,7 +103,7 @@ def test_with_the_traditional_seed_the_swarm_is_projection(scene: Scene, solver:
         ("afsa", Switches(), 3e-4, 3e-2),
     ],
 )
-@pytest.mark.by_day(2)
+@pytest.mark.by_day(1)
 def test_what_a_swarm_finds_without_being_told(solver: str, switches: Switches, least: float, most: float) -> None:
     found = _swarm(_run(PENDULUM, solver, switches=switches))
     assert least < found["error"] < most

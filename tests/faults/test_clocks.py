@@ -38,6 +38,7 @@ def wall_clocks(file: Path) -> int:
     return sum(pair in WALL for pair in pairs)
 
 
+@pytest.mark.by_day(1)
 @pytest.mark.parametrize("package", [shoal, shoal_flows])
 def test_only_stamps_are_taken_from_the_wall(package: Any) -> None:
     root = Path(package.__path__[0])

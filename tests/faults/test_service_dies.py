@@ -59,6 +59,7 @@ def undisturbed() -> dict[str, Any]:
     return answer(CliRunner().invoke(main, [*IDENTIFY, "least-squares"]).stdout)
 
 
+@pytest.mark.by_day(1)
 @pytest.mark.parametrize(
     ("last", "line"),
     [

@@ -248,6 +248,7 @@ def test_bad_parameters_are_refused_in_one_line(flow: str, parameters: dict[str,
     assert "\n" not in str(refusal.value)
 
 
+@pytest.mark.slow
 def test_a_study_is_repeated_from_its_run_alone(tmp_path: Path) -> None:
     scene = tmp_path / "mine.yaml"
     scene.write_text((files("shoal.scene") / "library" / "single-pendulum.yaml").read_text())

@@ -79,6 +79,7 @@ def test_what_another_mlflow_knows_is_left_to_whoever_uses_that(
         assert status(client, run_id) == "KILLED"
 
 
+@pytest.mark.slow
 def test_a_run_that_is_interrupted_is_killed_and_not_failed(client: Any) -> None:
     with pytest.raises(KeyboardInterrupt), store.open_run("Forward", "stopped") as run:
         raise KeyboardInterrupt

@@ -91,6 +91,7 @@ def written(documents: dict[str, str], folder: Path) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_champion_computes_what_shoal_simulates(fits: list[Fit], tmp_path: Path) -> None:
     from mlflow import pyfunc
 

@@ -34,6 +34,7 @@ def linkage(folder: Path, seed: int, sought: str) -> tuple[Problem, dict[str, fl
     return Problem.parse(stated, "four-bar"), truth
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("seed", "sought"),
     [(0, "crank"), *(pytest.param(s, b, marks=pytest.mark.slow) for s in range(3) for b in ("coupler", "rocker"))],

@@ -89,6 +89,7 @@ def test_windows_that_cannot_be_held_out_are_refused_in_one_line(windows: Any, w
     assert "\n" not in str(refusal.value)
 
 
+@pytest.mark.slow
 def test_what_is_held_out_does_not_change_the_fit(tmp_path: Path) -> None:
     """As if these samples had never been measured; windows are by the table's clock."""
     whole = fitted().measurement.first

@@ -74,6 +74,7 @@ OTHERS = ("auto", "casadi", "casadi-multiple", "multiple-shooting", "afsa")
 DAILY = ("least-squares", "iafsa")
 
 
+@pytest.mark.by_day(1)
 @pytest.mark.parametrize(
     "method",
     [pytest.param(name, marks=[pytest.mark.slow] * (name not in DAILY)) for name in METHODS if name not in OTHERS],

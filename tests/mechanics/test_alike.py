@@ -53,7 +53,7 @@ def _shared(matrix: Any, components: int) -> alike.Alike:
 @pytest.mark.parametrize("tile", [SINGLE, WIDE], ids=["single", "lanes"])
 @pytest.mark.parametrize("components", [1, 2, 3])
 @pytest.mark.parametrize("size", [1, 2, 5, 8, 16, 17, 31, 32, 33, 70])
-@pytest.mark.by_day(10)
+@pytest.mark.by_day(1)
 def test_solution_and_product_equal_numpy(size: int, components: int, tile: Tile) -> None:
     matrix = _chain(size)
     shared, whole = _shared(matrix, components), np.kron(matrix, np.eye(components))

@@ -349,7 +349,7 @@ COWPER = 10 * (1 + POISSON) / (12 + 11 * POISSON)
 
 
 @laws
-@pytest.mark.by_day(2)
+@pytest.mark.by_day(1)
 def test_a_cantilever_converges_to_the_director_rod_of_its_law(law: str) -> None:
     shape, exact = _director_rod(law, COWPER)
     # Two Gauss points need r_x held at one node, which costs the second order there.

@@ -62,7 +62,7 @@ def off_branch(run: Any, pins: Any) -> float:
 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("count", [2, 3, 4])
-@pytest.mark.by_day(2)
+@pytest.mark.by_day(1)
 def test_a_drive_that_moves_at_once_starts_on_a_branch(count: int, seed: int) -> None:
     """Rates were met by the nearest change: of no branch, on to which the motion snapped after milliseconds."""
     rate = np.random.default_rng(seed).uniform(0.2, 2.0)

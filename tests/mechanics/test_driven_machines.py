@@ -97,6 +97,7 @@ def test_drives_leave_multipliers_unique(integrator: str) -> None:
         np.testing.assert_allclose(run.marker("e"), swung(drive, crank, arm, start, times, 0.01), atol=1e-3)
 
 
+@pytest.mark.by_day(1)
 @pytest.mark.parametrize("tolerance", [1e-10, 1e-12])
 def test_the_estimated_error_of_an_open_chain_is_that_of_its_tolerance(tolerance: float) -> None:
     """A drive closes no loop: the looser run is a hundred times worse, and nothing near a singular position."""

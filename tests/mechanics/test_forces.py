@@ -129,7 +129,7 @@ def slope(function: Any, z: Array, step: float = 1e-5) -> Array:
 @pytest.mark.parametrize("rows", SHARED.values(), ids=SHARED)
 @pytest.mark.parametrize("numbers", [NO_TABLE, WITH_TABLE], ids=["law", "table"])
 @pytest.mark.parametrize("seed", range(3))
-@pytest.mark.by_day(2)
+@pytest.mark.by_day(1)
 def test_force_tangent_and_energy_agree(seed: int, numbers: tuple[int, int, int], rows: Any) -> None:
     tested = bench(KINDS, ELASTIC_LAW, numbers, rows)
     z = 0.7 * state(seed)

@@ -169,6 +169,7 @@ def test_an_empty_range_is_refused(end: float) -> None:
         fitting.fit(np.sin, end)
 
 
+@pytest.mark.slow
 @given(st.lists(st.floats(-10, 10), min_size=4, max_size=4), st.floats(1e-3, 1e4))
 def test_cubics_are_one_piece(powers: list[float], horizon: float) -> None:
     scaled = [c / horizon**k for k, c in enumerate(powers)]

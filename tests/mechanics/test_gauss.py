@@ -122,7 +122,7 @@ def _mass(model: Model) -> Any:
 
 @scenes
 @pytest.mark.parametrize("seed", range(3))
-@pytest.mark.by_day(2)
+@pytest.mark.by_day(1)
 def test_jacobian_and_bias_are_the_derivatives_of_the_constraints(kernels: Any, scene: Scene, seed: int) -> None:
     # Constraints are quadratic, so central differences are exact but for round-off.
     model = build(scene)

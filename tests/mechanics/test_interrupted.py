@@ -82,6 +82,7 @@ def test_a_handler_of_the_users_own_decides() -> None:
     assert process.returncode == -signal.SIGINT
 
 
+@pytest.mark.slow
 def test_the_command_ends_with_the_status_of_an_interrupt() -> None:
     process = ended(COMMAND)
     assert "shoal: stopped" in process.stderr

@@ -88,6 +88,7 @@ def test_a_soft_rod_that_a_constant_force_draws_stays_within_its_reach() -> None
     np.testing.assert_allclose(run.marker("m")[:, 0], wanted, atol=1e-4)
 
 
+@pytest.mark.by_day(1)
 @pytest.mark.parametrize("dimensions", [2, 3])
 def test_energy_that_is_wrong_is_seen_where_the_potential_is_negative(dimensions: int) -> None:
     """A force that throws, and rises and falls along the way within a few steps that are far too long."""

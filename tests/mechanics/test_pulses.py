@@ -225,7 +225,7 @@ def test_a_position_that_jumps_is_refused(integrator: str) -> None:
 
 @pytest.mark.parametrize("integrator", ["dop853", "radau5", "rk4", "leapfrog"])
 @pytest.mark.parametrize("width", [1e-2, 1e-4])
-@pytest.mark.by_day(2)
+@pytest.mark.by_day(1)
 def test_a_narrow_law_of_a_spring_is_not_leapt_over(integrator: str, width: float) -> None:
     """A mass passes at 1 m/s through a law that takes 0.2 J from it on its way."""
     law = f"{float(0.2 / width / np.sqrt(np.pi))!r}*exp(-((t - 0.3)/{width!r})**2)"

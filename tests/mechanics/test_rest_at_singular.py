@@ -92,6 +92,7 @@ def test_the_estimated_error_covers_the_true_one_of_many(seed: int) -> None:
     _check(seed)
 
 
+@pytest.mark.slow
 def test_lanes_move_as_single_runs_do() -> None:
     scene, _ = draw(3, 3, 0.0)
     rates = np.linspace(-1.0, 0.0, 9)

@@ -167,7 +167,7 @@ def test_deviations_of_correlated_parameters(rho: float, costs: tuple[float, flo
         ("lognormal(1,0.05)", stats.lognorm(np.sqrt(np.log1p(0.0025)), scale=1 / np.sqrt(1.0025)), 1.08),
     ],
 )
-@pytest.mark.by_day(2)
+@pytest.mark.by_day(1)
 def test_the_tolerance_of_one_distribution(text: str, law: Any, limit: float) -> None:
     """The factor with which h passes the limit as often as is allowed, also where the stated one never does."""
     target = 1e-2

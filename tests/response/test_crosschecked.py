@@ -69,6 +69,7 @@ def test_a_deviation_cannot_be_smaller_than_what_lies_beyond_a_limit() -> None:
     assert shifts(both, np.zeros(1), np.zeros(1), estimate(p, 1e-12))[1][0] == pytest.approx(d * math.sqrt(p))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in (1, 2))])
 def test_mean_and_deviation_allow_for_the_probability_beside_them(seed: int) -> None:
     """2e-3 of all pucks hit a pin of 4 mm and turn round; of 128 runs none does, and all say x = 1 m."""

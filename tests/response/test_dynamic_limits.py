@@ -95,7 +95,7 @@ def test_a_rare_force_by_importance_sampling() -> None:
 
 
 @pytest.mark.parametrize("way", WAYS)
-@pytest.mark.by_day(2)
+@pytest.mark.by_day(1)
 def test_the_probability_of_an_energy_by_every_way(way: str) -> None:
     """The energy is m g L sin(angle) from the start on, at all instants."""
     bound, mean, deviation = -8.3, -1.1, 0.04

@@ -79,7 +79,7 @@ def judge(answer: ModelResponse, mean: Array, deviation: Array) -> None:
 
 
 @pytest.mark.parametrize("seed", [*range(6), *(pytest.param(k, marks=pytest.mark.slow) for k in range(6, 60))])
-@pytest.mark.by_day(2)
+@pytest.mark.by_day(1)
 def test_random_chains(seed: int) -> None:
     """Stiffnesses within intervals move the mean through cycles; masses scatter by 0.01 to 0.5 %."""
     random = np.random.default_rng(seed)
@@ -144,6 +144,7 @@ def test_a_deviation_that_takes_more_runs_is_in_doubt() -> None:
     assert answer.boxes.std_gap > 0.1 or np.isfinite(answer.horizon)
 
 
+@pytest.mark.slow
 def test_runs_are_left_for_what_lies_beyond_the_horizon() -> None:
     """A deviation that takes an inner study, and the logistic map, which no polynomial tells."""
 

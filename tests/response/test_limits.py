@@ -29,6 +29,7 @@ from shoal_validation.uncertain.reached import REPETITIONS
 from thrown import ALONG, THROWN, UP
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "state",
     [

@@ -66,6 +66,7 @@ def test_products_of_lognormal_variables() -> None:
     assert found.quantiles[:, 0] == pytest.approx(levels, rel=3e-2)
 
 
+@pytest.mark.by_day(1)
 @pytest.mark.parametrize("size", [1 / math.sqrt(COUNT), 0.5, pytest.param(0.8, marks=pytest.mark.slow)])
 def test_the_cosine_of_a_sum(size: float) -> None:
     """E cos(s) = exp(-v / 2) with the variance v of s, and so of its double."""

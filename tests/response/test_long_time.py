@@ -66,6 +66,7 @@ def test_a_pendulum_for_a_thousand_seconds(method: str) -> None:
     assert method != "auto" or "time warp" in answer.found.why
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("motion", "end", "within", "runs", "how"),
     [

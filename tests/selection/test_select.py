@@ -33,6 +33,7 @@ def _with_modulus(value: float) -> Scene:
     return HEADLINE.with_values({f"bodies.{rod}.youngs_modulus": value for rod in ("OA", "AB")})
 
 
+@pytest.mark.by_day(1)
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-3])
 def test_headline_keeps_its_word_against_exudyn(tolerance: float) -> None:
     problem = get_problem("flexible-case-1")

@@ -178,6 +178,7 @@ def own_history(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 FAKE = [line(method="good"), line(error=0.25, limit=1e-3, method="bad")]
 
 
+@pytest.mark.slow
 def test_a_failing_line_exits_3_and_names_everything(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(command, "plan", lambda only, quick: FAKE)
     done = CliRunner().invoke(shoal, ["validate"])

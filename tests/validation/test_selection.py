@@ -31,6 +31,7 @@ def test_a_machine_keeps_its_word_at_a_fair_price(seed: int) -> None:
     assert case.work <= 2.5 * case.least or case.rigid
 
 
+@pytest.mark.by_day(1)
 @pytest.mark.parametrize("seed", [*BENT[:2], pytest.param(BENT[2], marks=pytest.mark.slow)])
 def test_exudyn_on_a_fine_mesh_agrees_within_the_tolerance(seed: int) -> None:
     machine = draw(seed)

@@ -385,6 +385,7 @@ def test_a_bound_that_excludes_the_truth_is_named_and_nothing_else(tmp_path: Pat
     assert "widen its bounds" in found.advice[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("declared", "factor"), [("deg", np.radians(1.0)), pytest.param("rad", np.degrees(1.0), marks=pytest.mark.slow)]
 )

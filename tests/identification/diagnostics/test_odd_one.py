@@ -58,6 +58,7 @@ def answer(known: bool = False, **samples: np.ndarray) -> Any:
     return identify(problem, measurement=Measurement(runs))
 
 
+@pytest.mark.slow
 def test_the_clock_of_one_of_three_recordings() -> None:
     found = answer(a=swing(-0.4), b=swing(-0.9, seed=1), c=swing(-1.2, TIMES / 1.02, seed=2))
     assert found.verdict is Verdict.REJECTED

@@ -123,6 +123,7 @@ def test_friction() -> None:
     assert named["friction of O"].kind == "machine"
 
 
+@pytest.mark.slow
 def test_a_heavier_rod() -> None:
     named = found(tip(TIMES, np.pi / 4, np.pi / 6, density=1500.0), TIMES)
     heavier = {"mass of AB": 1500.0, "mass of OA": 1000.0 / 1.5}

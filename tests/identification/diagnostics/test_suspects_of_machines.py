@@ -76,6 +76,7 @@ def test_a_pivot_on_a_heavy_block_moves_as_a_pivot_that_is_driven() -> None:
     assert candidate.described(values)[0] == pytest.approx(amplitude)
 
 
+@pytest.mark.slow
 def test_a_moving_pivot() -> None:
     wave = "0.02*sin(5*t + 1)"
     named = found(

@@ -62,6 +62,7 @@ def test_the_right_model_is_identified(noise: float | None) -> None:
         assert estimate.parameters[name].lower <= true <= estimate.parameters[name].upper
 
 
+@pytest.mark.by_day(1)
 @pytest.mark.parametrize("noise", [1e-3, pytest.param(None, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
     ("values", "data"),

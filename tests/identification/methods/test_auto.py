@@ -18,6 +18,7 @@ def forward(start: tuple[float, float], horizon: float, seed: int = 0) -> Forwar
     return ForwardModel(problem, problem.load_scene(SOLVER), get_engine("gauss"), data)
 
 
+@pytest.mark.by_day(1)
 @pytest.mark.parametrize("name", ["paper-case-1", "paper-case-1-same-mesh"])
 def test_a_short_record_costs_no_more_than_least_squares(name: str) -> None:
     estimate = identify(load_problem(name), method="auto")

@@ -52,6 +52,7 @@ def tables(draw: st.DrawFn) -> tuple[np.ndarray, dict[str, np.ndarray], list[Cha
     return times, columns, channels, draw(st.permutations(["t", *columns])), separator, draw(st.booleans())
 
 
+@pytest.mark.slow
 @given(tables())
 @settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_tables_come_back_as_they_were_written(

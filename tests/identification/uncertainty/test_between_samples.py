@@ -66,6 +66,7 @@ def fitted(folder: Path, rate: float, smooth: bool = True, noise: float | None =
     return identify(Problem.parse(stated if noise is None else {**stated, "noise": noise}, "driven"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("smooth", "noise"),
     [(True, 2e-5), *(pytest.param(*one, marks=pytest.mark.slow) for one in ((True, None), (False, None)))],

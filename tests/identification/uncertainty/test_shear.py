@@ -42,6 +42,7 @@ def problem(folder: Path, height: float, seed: int) -> Problem:
     return Problem.parse(stated, "thick")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("height", "seed"), [pytest.param(*case, marks=() if case == SHORT else pytest.mark.slow) for case in CASES]
 )

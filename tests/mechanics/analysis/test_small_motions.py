@@ -157,7 +157,7 @@ def test_free_motions_with_and_without_a_damper(damper: float) -> None:
     ("load", "retardation", "ok"),
     [(10.5, 1e-6, True), (11.5, 1e-6, False), (15.0, 1e-4, False), (19.9, 0.0, True), (20.2, 0.0, False)],
 )
-@pytest.mark.by_day(2)
+@pytest.mark.by_day(1)
 def test_internal_damping_lowers_the_load_of_becks_column(load: float, retardation: float, ok: bool) -> None:
     # 20.05 EI/L^2 without damping; 10.9 with vanishing internal damping (Bolotin and Zhinzher 1969).
     scene = _beck(load, retardation)

@@ -298,7 +298,7 @@ Smith, Thresher and Wang, Vibration modes of centrifugally stiffened beams, J. A
 
 
 @pytest.mark.parametrize("speed", WRIGHT)
-@pytest.mark.by_day(2)
+@pytest.mark.by_day(1)
 def test_rotating_blades_flap_as_in_the_tables_and_lag_as_southwell_says(speed: int) -> None:
     side, density, modulus = 0.02, 2700.0, 7e10
     unit = np.sqrt(modulus * side**2 / 12 / density)

@@ -152,6 +152,7 @@ def by_shooting(turn: Any, place: Any, foot: Any) -> Any:
     return at(0.5, found.x)[:3]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("turn", "place"),
     [
