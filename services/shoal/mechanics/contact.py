@@ -193,11 +193,8 @@ def decide(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float) -> None:
         if _concerns(size, width, lane, g.hit):
             _impact(tile, m, w, t, lane, wanted)
     # The acceleration without contacts decides which of those that do not separate press.
-    before = np.zeros(size * width)
     for at in range(size * width):
-        lane = at % width
-        before[at] = g.closed[at]
-        if _concerns(size, width, lane, g.hit):
+        if _concerns(size, width, at % width, g.hit):
             g.closed[at] = 0.0
             if g.hit[at] == LIFT or wanted[at] == 2.0:
                 wanted[at] = 0.0

@@ -1,4 +1,4 @@
-"""Where in a step a gap closes or a contact lets go: the first root of gaps and contact forces of its dense output.
+"""Event location within a step: the first root of gaps and contact forces in its dense output.
 
 A gap is looked at only where it could close: its rates at the ends times the step, doubled, against its size. There the
 step is divided, and each part is judged by values and rates at both ends, so that a gap that closes and opens again is

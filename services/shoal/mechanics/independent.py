@@ -1,4 +1,4 @@
-"""Constraints of a model that depend on no others wherever it moves, by the Jacobian at the start and beside it.
+"""Independent constraints of a model, by the rank of the Jacobian at the start and beside it.
 
 What depends on others at one position only, a singular one, is not redundant. So the machine is moved aside along its
 free directions, both ways, and closed again; a dependence that all positions show is one of the machine. Of its rows

@@ -42,7 +42,7 @@ class OneSided(Measures):
                 place, limit = self._apart(name, joint)
                 sign = UPPER if joint.keeps == "at-most" else LOWER
                 self._add(f"joints.{name}.keeps", "", place, sign, limit, joint.restitution)
-        resolution = RESOLUTION * float(np.max(span(self.scene)))
+        resolution = RESOLUTION * float(np.max(span(self.scene))) if self.kinds else 0.0
         return Gaps(len(self.kinds), self.forces(), stacked(self.signs), stacked(self.restitutions), resolution)
 
     def _add(self, field: str, side: str, place: Number, sign: float, limit: Number, restitution: Number) -> None:
