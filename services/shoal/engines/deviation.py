@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
+from shoal.engines.event_words import EventComparison, compare
 from shoal.scene import Scene
 from shoal.trajectory import Array, Trajectory
 
@@ -36,6 +38,12 @@ class Deviation:
             return None
         return self.factor * float(np.max(np.abs(turned(self.one.angles - self.other.angles)), initial=0.0))
 
+    @cached_property
+    def events(self) -> EventComparison:
+        """The comparison of the events of contacts, of which scenes without any have none."""
+        one, other = (run.model.get("events", ()) for run in (self.one, self.other))
+        return compare(one, other, self.factor)
+
     def of_markers(self) -> Array:
         """Return errors of x, y [m] and angle [rad] of every marker, in space of x, y and z, (instants, markers, 3).
 
@@ -49,9 +57,13 @@ class Deviation:
         return self.factor * np.maximum.accumulate(np.stack(columns, axis=2), axis=0)
 
     def of(self, quantity: Callable[[Trajectory, Scene], Array]) -> Array:
-        """Return errors of a quantity over time, (instants,), each the largest until then. quantity: of one run."""
+        """Return errors of a quantity over time, (instants,), each the largest until then. quantity: of one run.
+
+        Rates jump at impacts: at instants past one in one run and before it in the other they are not compared.
+        """
         one, other = (quantity(run, scene) for run, scene in zip((self.one, self.other), self.scenes, strict=True))
-        return np.asarray(self.factor * np.maximum.accumulate(np.abs(one - other)))
+        apart = np.where(self.events.beside(self.one.times)[-len(one) :], 0.0, np.abs(one - other))
+        return np.asarray(self.factor * np.maximum.accumulate(apart))
 
 
 def turned(angles: Array) -> Array:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +20,9 @@ from shoal.engines.contract import Engine
 from shoal.engines.deviation import Deviation, turned
 from shoal.engines.gauss import GaussEngine
 from shoal.engines.theory import theory_deviations
+from shoal.engines.undecided import TOGETHER, Undecided, undecided
 from shoal.errors import ShoalError
+from shoal.mechanics.gap_history import moved
 from shoal.mechanics.integrators import facts
 from shoal.mechanics.reach import span
 from shoal.scene import Revolute, Rod, Scene, Slider
@@ -70,17 +72,31 @@ class Careful(NamedTuple):
     scene: Scene
 
 
+class Outcome(NamedTuple):
+    """The other outcome of an open decision, and how far it is away.
+
+    matters: whether that is more than the time error and what the limit moved the other way is worth, without it
+    """
+
+    decision: Undecided
+    away: Deviation
+    matters: bool
+
+
 @dataclass(frozen=True)
 class Examined:
     """A run whose errors are to be estimated.
 
-    scale: how far its markers get [m]; native: the engine that makes the more careful runs
+    scale: how far its markers get [m]; native: the engine that makes the more careful runs; found: the errors so far,
+    by source; outcomes: of decisions on contacts that the time error leaves open
     """
 
     run: Trajectory
     scene: Scene
     scale: float
     native: Engine
+    found: dict[str, list[Deviation] | None] = field(default_factory=dict)
+    outcomes: list[Outcome] = field(default_factory=list)
 
     def careful(self, what: str, make: Callable[[], Iterator[Scene]], times: int = 1) -> tuple[Careful | None, str]:
         """Return the first run of some scenes that can be made and believed. times: the unknowns of the examined run.
@@ -150,7 +166,9 @@ def in_time(seen: Examined) -> tuple[list[Deviation] | None, str]:
         return [found if exact else replace(found, factor=HALVING)], ""
     if seen.scene.solver.relative_tolerance > ways.LOOSE:
         return [replace(found, factor=HALVING)], ""
-    chaotic = bool(np.any(_apart(seen.run, careful.run) > WRONG * np.array([seen.scale, 1.0])))
+    # Beyond the first event that one run does not have their distance says nothing about the order of the error.
+    apart = _apart(seen.run, careful.run) > WRONG * np.array([seen.scale, 1.0])
+    chaotic = bool(np.any(apart) or found.events.differs)
     if not chaotic and careful.run.steps <= FEWER * seen.run.steps:
         round_off = _round_off(seen.scale, seen.run, careful.run)
         share = min(1.0, round_off / found.distance) if found.distance else 0.0
@@ -163,6 +181,28 @@ def in_time(seen: Examined) -> tuple[list[Deviation] | None, str]:
     if chaotic:
         return [found], ""
     return None, note or "time error not estimated: the run with shorter steps is rejected"
+
+
+def of_contacts(seen: Examined) -> tuple[list[Deviation] | None, str]:
+    """Estimate what decisions on contacts are worth that the time error leaves open, by the other outcome of each."""
+    in_time = seen.found.get("time")
+    if not in_time or "events" not in seen.run.model:
+        return [], ""
+    one = in_time[0]
+    open_ = undecided(one)
+    if open_ is None:
+        return None, "open decisions on contacts not looked for: the run is too large to be followed"
+    for each in open_:
+        back = {gap: -shift for gap, shift in each.shift.items()}
+        other, same = (moved(one.scenes[0], seen.run.times, shift) for shift in (each.shift, back))
+        if not (other.ok and same.ok):
+            return None, f"effect of an open decision on a contact not estimated: {other.message or same.message}"
+        away = Deviation("contacts", one.one, other, (seen.scene, seen.scene))
+        # A tie has another outcome to either side.
+        plain = 0.0 if each.what == TOGETHER else one.one.distance(same)
+        matters = away.distance > plain + one.distance
+        seen.outcomes.append(Outcome(each, away, matters))
+    return [each.away for each in seen.outcomes if each.decision.what != TOGETHER], ""
 
 
 def of_mesh(seen: Examined) -> tuple[list[Deviation] | None, str]:
@@ -240,6 +280,7 @@ def _apart(one: Trajectory, other: Trajectory) -> Array:
 
 SOURCES = (
     ErrorSource("time", lambda scene: True, in_time),
+    ErrorSource("contacts", lambda scene: True, of_contacts),
     ErrorSource("mesh", lambda scene: any(scene.flexible_rods), of_mesh),
     ErrorSource("theory", lambda scene: True, of_theory),
     ErrorSource("friction", lambda scene: bool(_rubbing(scene)), of_friction),

@@ -17,8 +17,10 @@ import numpy as np
 
 from shoal.engines.contract import Engine
 from shoal.engines.deviation import Deviation
+from shoal.engines.event_words import EventComparison
 from shoal.engines.gauss import GaussEngine
-from shoal.engines.sources import SOURCES, WRONG, Examined, Rejected
+from shoal.engines.sources import SOURCES, WRONG, Examined, Outcome, Rejected
+from shoal.engines.undecided import GRAZING, ORDER, TOGETHER
 from shoal.engines.ways import as_run
 from shoal.error_budget import ErrorBudget
 from shoal.findings import Finding
@@ -43,7 +45,8 @@ class Verification:
     not be estimated, and `note` says why; angle_error: of the time step [rad]; scale: how far the markers get from the
     ground [m]; rejected: why the more careful run is itself not to be trusted; engine: that made the run, if it is not
     the native one, from which that of time is then how far it is off, whichever of them is wrong; deviations: the
-    second runs, which estimate the error of any other quantity too
+    second runs, which estimate the error of any other quantity too; events: their comparison in time; undecided:
+    decisions on contacts that the time error leaves open, and the other outcome of each
     """
 
     errors: ErrorBudget
@@ -53,6 +56,8 @@ class Verification:
     angle_error: float | None = None
     engine: str = ""
     deviations: tuple[Deviation, ...] = field(default=(), repr=False, compare=False)
+    events: EventComparison | None = None
+    undecided: tuple[Outcome, ...] = ()
 
     def error(self, source: str) -> float:
         """Return the known error of a source [m]; 0 where none is known."""
@@ -63,13 +68,20 @@ class Verification:
         names = ("scale", "note", "rejected", "angle_error", "engine")
         found = {f"{source.name}_error": self.errors.estimates.get(source.name) for source in SOURCES}
         found |= {name: getattr(self, name) for name in names} | {"not_estimated": self.errors.unknown}
-        return dict(plain(found))
+        contacts: dict[str, Any] = {}
+        if self.events is not None:
+            contacts["events"] = self.events.to_json()
+            contacts["undecided"] = [
+                {**one.decision.to_json(), "distance": one.away.distance, "matters": one.matters}
+                for one in self.undecided
+            ]
+        return dict(plain(found | contacts))
 
     @property
     def findings(self) -> list[Finding]:
         """Return the reason for rejecting the run, or remarks on errors that are large and do not reject it."""
         rejection = self._rejection()
-        return self._remarks() if rejection is None else [rejection]
+        return [*(self._remarks() if rejection is None else [rejection]), *self._contacts()]
 
     def _rejection(self) -> Finding | None:
         if self.rejected:
@@ -83,12 +95,28 @@ class Verification:
                 text = f"the time error is about {error:.2g} {unit}"
                 return kinds.TIME_ERROR.found(text, error=error, allowed=allowed)
         for source, kind, text in (
+            ("contacts", kinds.CONTACTS_OPEN, "what the time error leaves open of contacts moves a marker by {:.2g} m"),
             ("mesh", kinds.MESH_ERROR, "the mesh error is about {:.2g} m"),
             ("bending", kinds.BENDING_ERROR, "modal rods bend too far: cables, which may, end about {:.2g} m away"),
         ):
             if (error := self.error(source)) > WRONG * self.scale:
                 return kind.found(text.format(error), error=error, allowed=WRONG * self.scale)
         return None
+
+    def _contacts(self) -> list[Finding]:
+        """Return open decisions on contacts that matter, and the first event that a more careful run does not have."""
+        named = {GRAZING: kinds.NEAR_GRAZING, ORDER: kinds.ORDER_OPEN, TOGETHER: kinds.SIMULTANEOUS}
+        found = [
+            named[one.what].found(
+                f"{one.text}: the other outcome moves a marker by {away:.2g} m",
+                time=one.time, margin=one.margin, error=one.error, distance=away,
+            )
+            for one, away in ((each.decision, each.away.distance) for each in self.undecided if each.matters)
+        ]  # fmt: skip
+        if not found and self.events is not None and self.events.differs:
+            text = f"a more careful run has other events: {self.events.text}"
+            found = [kinds.EVENTS_DIFFER.found(text, time=self.events.until)]
+        return found
 
     def _remarks(self) -> list[Finding]:
         found = [kinds.NOT_ESTIMATED.found(self.note)] if self.note else []
@@ -135,7 +163,7 @@ def verify(trajectory: Trajectory, scene: Scene, native: Engine | None = None) -
         unknown = {source.name: None for source in concerned if source.name in ("time", "mesh")}
         return Verification(ErrorBudget(unknown), scale, note)
     seen = Examined(trajectory, scene, scale, native or GaussEngine())
-    found: dict[str, list[Deviation] | None] = {}
+    found = seen.found
     notes = []
     for source in concerned:
         try:
@@ -155,6 +183,8 @@ def verify(trajectory: Trajectory, scene: Scene, native: Engine | None = None) -
         angle_error=in_time[0].angle if in_time else None,
         engine="" if trajectory.engine == GaussEngine().name else trajectory.engine,
         deviations=tuple(one for each in found.values() for one in each or ()),
+        events=in_time[0].events if in_time and "events" in trajectory.model else None,
+        undecided=tuple(seen.outcomes),
     )
 
 

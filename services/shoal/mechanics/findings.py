@@ -91,6 +91,35 @@ CREEPS = Kind(
     "What dry friction should hold creeps by more than a hundredth of the scale.",
     "lower coulomb_speed",
 )
+CONTACTS_OPEN = _rejects(
+    "open-contacts",
+    Status.FAILED,
+    "Decisions on contacts that the time error leaves open move a marker by more than a tenth of the machine's scale.",
+    f"use {SMALLER}, or move the limit away from where it is just met",
+)
+NEAR_GRAZING = Kind(
+    "near-grazing",
+    Severity.CAUTION,
+    "A one-sided constraint is met or missed by less than the run's own error: whether it is met is not decided.",
+    f"use {SMALLER}, or move the limit away from where it is just met",
+)
+ORDER_OPEN = Kind(
+    "order-of-impacts-not-resolved",
+    Severity.CAUTION,
+    "Two impacts are closer in time than their errors: which one comes first is not decided.",
+    f"use {SMALLER}",
+)
+SIMULTANEOUS = Kind(
+    "simultaneous-impact",
+    Severity.CAUTION,
+    "Contacts that close at one instant share one impact (Moreau); one after the other they lead elsewhere.",
+)
+EVENTS_DIFFER = Kind(
+    "events-differ",
+    Severity.CAUTION,
+    "A more careful run has other impacts, openings or rests; their motions are compared in the time error.",
+    f"use {SMALLER}",
+)
 POINT_REJECTED = Kind(
     "point-rejected", Severity.CAUTION, "A lane that was run alone with its errors estimated is rejected."
 )

@@ -11,6 +11,7 @@ import numpy as np
 from shoal.errors import InputError
 from shoal.mechanics import forces, states
 from shoal.mechanics.dynamics import Work, derived_rows, work_space
+from shoal.mechanics.event_record import recorded
 from shoal.mechanics.halts import Halts
 from shoal.mechanics.integrators import Choice, choose, facts
 from shoal.mechanics.integrators.scheme import connect
@@ -119,18 +120,15 @@ class Workspace:
 
     @property
     def events(self) -> list[dict[str, Any]]:
-        """Impacts and openings of contacts in a march of one lane, the first `LOGGED` of them."""
+        """Events of contacts in a march of one lane, the first `LOGGED` of them, see `event_record.recorded`."""
         gaps = self.march.frame.room.gaps
         names = [field.split(".")[1] for field in self._model.gap_fields]
         if not names:
             return []
         log = gaps.log[: 3 * int(gaps.number[0])].reshape(-1, 3)
-        return [
-            {"time": float(t), "joint": names[int(k)], "kind": "impact", "impulse": float(push)}
-            if push >= 0
-            else {"time": float(t), "joint": names[int(k)], "kind": "opens"}
-            for t, k, push in log
-        ]
+        # Where a log is full, what became of its contacts later is not known.
+        whole = len(log) == int(gaps.number[0])
+        return recorded(log, names, gaps.closed if whole else np.zeros_like(gaps.closed))
 
     @property
     def left(self) -> tuple[Array, Array, Array]:

@@ -63,6 +63,18 @@ def count_turns(tile: Tile, arrays: Arrays, room: Work) -> None:
     _run(_remember, tile, arrays, room)
 
 
+def follow_gaps(tile: Tile, arrays: Arrays, room: Work, q: Array, v: Array) -> tuple[Array, Array]:
+    """Values and rates of the gaps along a motion of one lane, (samples, gaps); q, v: (samples, unknowns).
+
+    Samples are less than half a turn apart, from the state of the room on.
+    """
+    samples, size = len(q), arrays.gaps.size
+    out = np.concatenate([np.stack([q, v], axis=1).ravel(), np.zeros(2 * samples * size)])
+    _run(_follow, tile, arrays, room, float(samples), 0.0, out)
+    value, rate = out[-2 * samples * size :].reshape(2, samples, size)
+    return value, rate
+
+
 def signatures(tile: Tile, arrays: Arrays, room: Work) -> list[kernels.Kernel]:
     """Return the kernels of all evaluations of a model, with the types of their arguments."""
     return [(kernel, _kinds(tile, arrays, room)) for kernel in (_look, _elastic, _accelerate, _stored, _remember)]
@@ -125,3 +137,16 @@ def _stored(tile, m, w, t, tolerance, out):  # type: ignore[no-untyped-def]
 @njit(cache=True, error_model="numpy")
 def _remember(tile, m, w, t, tolerance, out):  # type: ignore[no-untyped-def]
     dynamics.remember(tile, m, w)
+
+
+@njit(cache=True, error_model="numpy")
+def _follow(tile, m, w, t, tolerance, out):  # type: ignore[no-untyped-def]
+    samples, n, size = int(t), m.unknowns, m.gaps.size
+    for k in range(samples):
+        for i in range(n):
+            w.z[i], w.zdot[i] = out[2 * n * k + i], out[2 * n * k + n + i]
+        dynamics.remember(tile, m, w)
+        kernels.look(tile, m, w, w.z, w.zdot)
+        for number in range(size):
+            at = 2 * n * samples + size * k + number
+            out[at], out[at + samples * size] = w.gaps.value[number], w.gaps.rate[number]

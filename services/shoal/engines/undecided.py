@@ -1,0 +1,130 @@
+"""Decisions on contacts that the error of a run leaves open: near misses, light touches, the order of two impacts.
+
+A gap of a run is known to the difference from a more careful run. Where that is more than what decides on an event (the
+least gap of a near miss, the depth that a light touch would reach without the stop, the time between two impacts),
+either outcome may be the true one, though both runs agree by chance. The other outcome is had by moving the limit of
+that gap by just as much, and the distance of that motion is an error of the run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from shoal.engines.deviation import Deviation
+from shoal.engines.event_words import Event
+from shoal.mechanics.gap_history import GapHistory, event_times, follow, instants
+from shoal.trajectory import Array
+
+GRAZING, ORDER, TOGETHER = "near-grazing", "order-of-impacts", "simultaneous"
+
+
+@dataclass(frozen=True)
+class Undecided:
+    """An open decision.
+
+    what: GRAZING, ORDER, or TOGETHER of two impacts at one instant, which are one by the law of impacts; joints: that
+    it is about; time [s]; margin: what decides, a gap [m or rad] or a time [s], and the error of that; shift: by how
+    much less there is of a gap, by its number, for the other outcome [m or rad]
+    """
+
+    what: str
+    joints: tuple[str, ...]
+    time: float
+    margin: float
+    error: float
+    shift: dict[int, float]
+
+    @property
+    def text(self) -> str:
+        """One clause."""
+        names, at = " and ".join(self.joints), f"t = {self.time:.6g} s"
+        if self.what == GRAZING:
+            return f"{names} is met or missed by {self.margin:.1e} m or rad at {at}, known to {self.error:.1e}"
+        if self.what == TOGETHER:
+            return f"impacts of {names} at {at} are one by Moreau's law"
+        return f"impacts of {names} at {at} are {self.margin:.1e} s apart, known to {self.error:.1e} s"
+
+    def to_json(self) -> dict[str, Any]:
+        """Return plain data."""
+        found = {name: getattr(self, name) for name in ("what", "joints", "time", "margin", "error")}
+        return {**found, "joints": list(self.joints)}
+
+
+def undecided(deviation: Deviation) -> list[Undecided] | None:
+    """Return the first open decision on every gap; None where the runs are too large to be followed.
+
+    deviation: of runs of the native engine in time. Raises InputError.
+    """
+    runs = deviation.one, deviation.other
+    times, events = (np.union1d(*map(each, runs)) for each in (instants, event_times))
+    one, other = (follow(scene, times, events) for scene in deviation.scenes)
+    if one is None or other is None:
+        return None
+    apart = deviation.factor * np.maximum.accumulate(np.abs(one.value - other.value), axis=0)
+    error = np.maximum(apart, one.resolution)
+    found = [
+        each
+        for history, run in zip((one, other), runs, strict=True)
+        for each in (*_grazes(history, run.model["events"], error), *_orders(history, run.model["events"], error))
+    ]
+    # Beyond the first event that one run does not have their distance is no error.
+    parting = deviation.events
+    first: dict[tuple[str, tuple[int, ...]], Undecided] = {}
+    for each in sorted(found, key=lambda one: one.time):
+        if each.time <= parting.until:
+            first.setdefault((each.what, tuple(each.shift)), each)
+    if not first and parting.differs:
+        concerned = {event["joint"] for event in parting.differs if event is not None}
+        about = sorted((one for one in found if concerned & {*one.joints}), key=lambda one: one.time)
+        return about[:1]
+    return list(first.values())
+
+
+def _grazes(history: GapHistory, events: Sequence[Event], error: Array) -> Iterator[Undecided]:
+    """Yield near misses and light touches that are within the error of a gap."""
+    for gap, joint in enumerate(history.joints):
+        own = np.unique([event["time"] for event in events if event["joint"] == joint])
+        for time, margin in zip(*history.nearest(gap), strict=True):
+            known = float(error[np.searchsorted(history.times, time), gap])
+            if margin <= known:
+                yield Undecided(GRAZING, (joint,), float(time), float(margin), known, {gap: margin + known})
+        for time in own:
+            k = int(np.searchsorted(history.times, time))
+            rate, change = history.before(gap, k)
+            # A gap whose rate falls would have turned round at this depth below zero.
+            if rate < 0.0 < change and abs(history.value[k, gap]) <= error[k, gap]:
+                depth, known = 0.5 * rate * rate / change, float(error[k, gap])
+                if depth <= known:
+                    yield Undecided(GRAZING, (joint,), float(time), depth, known, {gap: -(depth + known)})
+
+
+def _orders(history: GapHistory, events: Sequence[Event], error: Array) -> Iterator[Undecided]:
+    """Yield neighbouring impacts of two gaps whose order is not known."""
+    impacts = [event for event in events if event["kind"] == "impact"]
+    for one, other in pairwise(impacts):
+        if one["joint"] == other["joint"]:
+            continue
+        first, second = (_hit(history, event, error) for event in (one, other))
+        if first is None or second is None:
+            continue
+        margin, doubt = other["time"] - one["time"], first[2] / first[1] + second[2] / second[1]
+        if margin <= doubt:
+            gap, rate, _ = first
+            joints, what = (one["joint"], other["joint"]), ORDER if margin else TOGETHER
+            yield Undecided(what, joints, one["time"], margin, doubt, {gap: -rate * (margin + doubt)})
+
+
+def _hit(history: GapHistory, event: Event, error: Array) -> tuple[int, float, float] | None:
+    """Return the gap that an impact closes, the speed at which it does, and the error of the gap there."""
+    k = int(np.searchsorted(history.times, event["time"]))
+    own = (gap for gap, joint in enumerate(history.joints) if joint == event["joint"])
+    falling = [gap for gap in own if history.rate[k, gap] < 0.0]
+    if not falling:
+        return None
+    gap = min(falling, key=lambda one: abs(float(history.value[k, one])))
+    return gap, -float(history.rate[k, gap]), float(error[k, gap])

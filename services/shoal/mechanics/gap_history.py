@@ -1,0 +1,117 @@
+"""Gaps of one-sided constraints along a motion: their values, how near they come to closing, and motions of others."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from shoal.mechanics.analysis import evaluations
+from shoal.mechanics.forces import LAW, NATURAL
+from shoal.mechanics.integrators import facts
+from shoal.mechanics.machine import Machine
+from shoal.mechanics.numerics.tile import SINGLE, Array
+from shoal.mechanics.runs import Runs
+from shoal.mechanics.simulate import runs, simulate
+from shoal.mechanics.workspace import at_start
+from shoal.scene import Scene
+from shoal.trajectory import Trajectory
+
+PARTS = 8
+"""Samples of a step of an adaptive integrator: so many as those of `contact_events`, which look for events."""
+AFTER = 1e-3
+"""Part of the time to the next event at which rates are those after an event."""
+ROOM = 2**25
+"""Coordinates and rates that are kept at most (a quarter of a gigabyte)."""
+
+
+@dataclass(frozen=True)
+class GapHistory:
+    """Gaps of a run at instants close enough to see every approach.
+
+    times [s]: (samples,); events: those of them at which contacts of any gap close or open, where rates are those
+    before; fields: what states the gaps; value [m or rad], rate: (samples, gaps). resolution: gaps below it are closed
+    """
+
+    times: Array
+    events: Array
+    fields: tuple[str, ...]
+    value: Array
+    rate: Array
+    resolution: float
+
+    @property
+    def joints(self) -> list[str]:
+        """The joint or contact of every gap."""
+        return [field.split(".")[1] for field in self.fields]
+
+    def nearest(self, gap: int) -> tuple[Array, Array]:
+        """Return times and values of the least values that a gap passes while it is open.
+
+        By the cubic polynomials through values and rates of neighbouring samples.
+        """
+        left, right = self.rate[:-1, gap], self.rate[1:, gap]
+        open_ = self.value[:, gap] > self.resolution
+        smooth = ~np.isin(self.times[:-1], self.events)
+        k = np.flatnonzero((left < 0.0) & (right > 0.0) & open_[:-1] & open_[1:] & smooth)
+        step = self.times[k + 1] - self.times[k]
+        a, b = self.rate[k, gap] * step, self.rate[k + 1, gap] * step
+        rise = self.value[k + 1, gap] - self.value[k, gap]
+        # g(x) = g0 + a x + c x^2 + d x^3, 0 < x < 1, whose slope falls from a < 0 to b > 0 through one root.
+        c, d = 3.0 * rise - 2.0 * a - b, a + b - 2.0 * rise
+        x = -a / (c + np.sqrt(np.maximum(c * c - 3.0 * a * d, 0.0)))
+        return self.times[k] + x * step, self.value[k, gap] + x * (a + x * (c + x * d))
+
+    def before(self, gap: int, sample: int) -> tuple[float, float]:
+        """Return the rate of a gap at a sample and how fast it changed before; not at all at the first one."""
+        if sample == 0:
+            return float(self.rate[0, gap]), 0.0
+        change = self.rate[sample, gap] - self.rate[sample - 1, gap]
+        return float(self.rate[sample, gap]), float(change / (self.times[sample] - self.times[sample - 1]))
+
+
+def instants(run: Trajectory) -> Array:
+    """Return times [s] that show all approaches of a run of the native engine.
+
+    They are parts of its steps, its events, at which the rates are those before, and instants AFTER these.
+    """
+    end, parts = float(run.times[-1]), PARTS if facts(run.model["integrator"]).adaptive else 1
+    ends = np.unique(np.concatenate([[0.0], event_times(run), [end]]))
+    grid = np.linspace(0.0, end, parts * run.steps + 1)
+    between = np.concatenate([ends[:-1] + part * np.diff(ends) for part in (AFTER, 0.5)])
+    found = np.unique(np.concatenate([grid, ends, between, run.times]))
+    return np.asarray(found[found <= end])
+
+
+def event_times(run: Trajectory) -> Array:
+    """Times [s] of the events at which contacts close and open."""
+    return np.unique([event["time"] for event in run.model["events"] if event["kind"] != "rests"])
+
+
+def follow(scene: Scene, times: Array, events: Array) -> GapHistory | None:
+    """Return the gaps of a run of a scene at given times, from 0 on; None of one that is too large.
+
+    events: at which contacts close and open [s]. The run is made again: what samples it does not change it. Raises
+    InputError.
+    """
+    machine = Machine.of(scene)
+    model = runs(machine, scene.solver, float(times[-1])).model
+    if 2 * len(times) * model.unknowns > ROOM:
+        return None
+    states = simulate(scene, times, machine=machine, whole=True).states
+    arrays, room = at_start(states.model, SINGLE, slice(0, 1))
+    evaluations.enter(arrays, room)
+    value, rate = evaluations.follow_gaps(SINGLE, arrays, room, states.q[..., 0], states.v[..., 0])
+    return GapHistory(times, events, model.gap_fields, value, rate, model.gaps.resolution)
+
+
+def moved(scene: Scene, times: Array, shifts: Mapping[int, float]) -> Trajectory:
+    """Return the motion with other limits. shifts: how much less of a gap there is [m or rad], by its number."""
+    own = runs(Machine.of(scene), scene.solver, float(times[-1]))
+    gaps = own.model.gaps
+    law = gaps.measures.law.copy()
+    for gap, shift in shifts.items():
+        law[LAW * gap + NATURAL] += gaps.sign[gap] * shift
+    gaps = gaps._replace(measures=gaps.measures._replace(law=law))
+    return Runs(own.scene, replace(own.model, gaps=gaps, shared_tiles={}), own.choice).run(times)

@@ -1,0 +1,141 @@
+"""Second runs compare events of contacts: equal words, near misses, the order of impacts."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import shoal
+from scipy.integrate import solve_ivp
+from shoal.engines.event_words import compare
+from shoal.scene import Scene
+
+DOWN, HIGH = -np.pi / 2, np.pi / 3
+PULL = 1.5 * 9.81
+"""Of a uniform rod of 1 m on a pin: its angle x from below obeys x'' = -PULL sin x [1/s^2]."""
+
+
+def rod(stop: float, restitution: float = 1.0, **solver: Any) -> Scene:
+    """Return the rod let go at HIGH, with a stop at an angle from below [rad]."""
+    body = {"kind": "rigid-body", "mass": 1.0, "inertia": 1 / 12, "centre_of_mass": [0.5, 0.0],
+            "named_points": {"end": [1.0, 0.0]}}  # fmt: skip
+    pin = {"first": {"body": "ground", "point": [0.0, 0.0]}, "second": {"body": "B"},
+           "stops": {"min": DOWN + stop, "restitution": restitution}}  # fmt: skip
+    return Scene.parse({"name": "rod", "gravity": [0.0, -9.81], "bodies": {"B": body}, "joints": {"O": pin},
+                        "markers": {"P": {"body": "B", "point": "end"}},
+                        "initial": {"B": {"angle": DOWN + HIGH, "rate": 0.0}},
+                        "solver": {"duration": 1.5, **solver}})  # fmt: skip
+
+
+@pytest.mark.compiles("kernels of contacts, which few machines need")
+def test_times_of_equal_events_are_known_to_their_difference() -> None:
+    run = shoal.simulate(rod(0.2, 0.8, duration=10.0))
+    told = run.model["verification"]["events"]
+    assert told["paired"] == len(run.model["events"])
+    assert not told["differs"]
+    assert 0.0 < told["time_error"] < 1e-8
+    assert not run.findings
+    *_, last, rests = run.model["events"]
+    assert (rests["kind"], rests["joint"]) == ("rests", "O")
+    assert rests["impacts"] == len(run.model["events"]) - 1
+    # Where the impacts accumulate: elliptic integrals, see `test_stops`.
+    assert rests["time"] == pytest.approx(6.456691947419185, abs=1e-9)
+    assert last["time"] < rests["time"]
+
+
+@pytest.mark.parametrize("short", [1e-6, 1e-10, 1e-12, 0.0, -1e-12, -1e-6])
+def test_a_stop_that_is_just_met_or_missed_is_told_with_its_margin(short: float) -> None:
+    """At (1 - short) of the amplitude. A perfect stop turns the motion round sooner, by a time in closed form."""
+    run = shoal.simulate(rod(-HIGH * (1.0 - short)))
+    assert run.ok, run.message
+    open_ = run.model["verification"]["undecided"]
+    assert bool(open_) == (abs(short) < 1e-11)
+    assert [one.code for one in run.findings] == ["near-grazing"] * len(open_)
+    for one in open_:
+        assert 0.0 <= one["margin"] <= one["error"] < 1e-9
+        assert abs(short) * HIGH <= one["margin"] + one["error"]
+    # x(t) = x_free(t + 2 dt) after it, dt the time from the stop to the amplitude.
+    shift = 2.0 * np.sqrt(2.0 * max(short, 0.0) * HIGH / (PULL * np.sin(HIGH)))
+    way = solve_ivp(lambda _, y: [y[1], -PULL * np.sin(y[0])], (0.0, 2.0), [HIGH, 0.0], "DOP853", rtol=1e-13,
+                    atol=1e-14, dense_output=True)  # fmt: skip
+    late = run.times > 0.9
+    true = way.sol(run.times[late] + shift)[0] + DOWN
+    away = np.max(np.hypot(*(run.points[late, 0, :, 0].T - np.array([np.cos(true), np.sin(true)]))))
+    known = run.errors.total
+    assert known is not None
+    assert away <= known + 1e-11
+
+
+def balls(late: float, kept: float = 0.5) -> Scene:
+    """Return a ball at rest that two others reach from both sides, on springs, one of them from farther away [m]."""
+    places = {"m": [0.0, 0.0], "a": [-0.5, 0.0], "b": [0.5 + late, 0.0]}
+    rates = {"m": 0.0, "a": 1.0, "b": -1.0}
+    between: dict[str, Any] = {"kind": "distance", "keeps": "at-least", "length": 0.1, "restitution": kept,
+                               "first": {"body": "m"}}  # fmt: skip
+    spring: dict[str, Any] = {"kind": "spring", "first": {"body": "ground", "point": [0.0, 0.0]}, "stiffness": 30.0,
+                              "length": 0.05}  # fmt: skip
+    return Scene.parse({
+        "name": "balls", "gravity": [0.0, 0.0], "bodies": {key: {"kind": "point-mass", "mass": 1.0} for key in places},
+        "joints": {name: between | {"second": {"body": name}} for name in "ab"},
+        "loads": {f"spring-{name}": spring | {"second": {"body": name}} for name in "ab"},
+        "markers": {name: {"body": name} for name in places},
+        "initial": {name: {"position": places[name], "velocity": [rates[name], 0.0]} for name in places},
+        "solver": {"duration": 0.5},
+    })  # fmt: skip
+
+
+def test_impacts_whose_order_is_not_known_are_rejected_as_the_other_order_ends_elsewhere() -> None:
+    run = shoal.simulate(balls(1e-12))
+    assert str(run.status[0]) == "failed"
+    assert [one.code for one in run.findings] == ["open-contacts", "order-of-impacts-not-resolved"]
+    (first, *_) = run.model["verification"]["undecided"]
+    assert first["joints"] == ["a", "b"]
+    assert first["margin"] < first["error"] < 1e-11
+    # The other order is the mirror image.
+    m, a, b = (run.marker(name)[-1, 0] for name in "mab")
+    assert first["distance"] == pytest.approx(max(abs(2 * m), abs(a + b)), rel=1e-3)
+
+
+def test_an_order_that_is_known_or_does_not_matter_is_no_doubt() -> None:
+    known = shoal.simulate(balls(1e-8))
+    assert known.ok
+    assert not known.findings
+    # Of equal balls that lose nothing every order ends alike.
+    equal = shoal.simulate(balls(1e-12, 1.0))
+    assert equal.ok
+    assert not equal.findings
+    assert equal.model["verification"]["undecided"]
+    tie = shoal.simulate(balls(0.0))
+    assert tie.ok
+    assert [one.code for one in tie.findings] == ["simultaneous-impact"]
+    assert tie.model["verification"]["contacts_error"] is None
+
+
+def events(*letters: str) -> list[dict[str, Any]]:
+    names = {"i": "impact", "o": "opens", "r": "rests"}
+    return [{"time": 0.1 * k, "kind": names[one[0]], "joint": one[1]} for k, one in enumerate(letters)]
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "paired", "parts"),
+    [
+        ("iA iB oA", "iA iB oA", 3, None),
+        ("iA iA iA rA oA", "iA iA rA oA", 4, None),
+        ("iA iA rA", "iA iA iA iA rA iB", 3, (None, "B")),
+        ("iA iB", "iB iA", 0, ("A", "B")),
+        ("iA iA iB rA", "iA rA", 1, ("A", "A")),
+        ("", "iA", 0, (None, "A")),
+    ],
+)
+def test_words_are_compared_from_the_beginning(one: str, other: str, paired: int, parts: Any) -> None:
+    """A run that rests a few invisible hops later is no other one."""
+    found = compare(events(*one.split()), events(*other.split()), 2.0)
+    assert found.paired == paired
+    assert (tuple(event and event["joint"] for event in found.differs) or None) == parts
+
+
+def test_rates_between_two_times_of_an_impact_are_not_compared() -> None:
+    found = compare([{"time": 1.0, "kind": "impact", "joint": "A"}], [{"time": 1.1, "kind": "impact", "joint": "A"}])
+    assert found.time_error == pytest.approx(0.1)
+    np.testing.assert_array_equal(found.beside(np.array([0.9, 1.05, 1.2])), [False, True, False])
