@@ -156,7 +156,7 @@ TOLD: dict[str, tuple[str, tuple[str, ...]]] = {
     ),
     "tendon": (
         machine(hinge(), beside=WALL, more=tendon('stiffness="5" damping="1 2" armature="5" range="0 1"')),
-        ("tendon t: its limits", "tendon t: its armature", "tendon t: its damping that is not linear"),
+        ("tendon t: its armature", "tendon t: its damping that is not linear"),
     ),
     "weld-elsewhere": (
         machine(hinge(), beside=SECOND, more=held('weld relpose=".5 .1 .3 1 0 0 0"')),

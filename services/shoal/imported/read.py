@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from shoal.errors import InputError
+from shoal.imported import limits
 from shoal.imported.absent import absent
 from shoal.imported.actuators import add_actuators
 from shoal.imported.audit import MJCF, URDF, constraints, unread
@@ -76,8 +77,9 @@ def read(file: Path) -> Imported:
         raise InputError(f"{file}: nothing in it moves{''.join(f'; {note}' for note in notes)}")
     _audit(file, root, parts)
     scene = _scene(source, parts, re.sub(r"[^A-Za-z0-9_-]", "-", file.stem))
-    _rest(scene, Scene.parse(scene, str(file)), parts.away)
+    _count_angles(scene, parts.away, str(file))
     warned = tuple(" ".join(str(one.message).split()) for one in told)
+    notes += limits.note(parts)
     return Imported(scene, tuple(parts.left_out), tuple(parts.missing), tuple(notes), warned)
 
 
@@ -138,14 +140,31 @@ def _markers(source: Source, parts: Parts) -> dict[str, Any]:
     return markers
 
 
-def _rest(data: dict[str, Any], scene: Scene, away: dict[str, float]) -> None:
-    """States the angles [rad], as the mechanics counts them, of torsion springs that rest so far from the start."""
+def _count_angles(data: dict[str, Any], away: dict[str, float], file: str) -> None:
+    """State angles [rad] as the mechanics counts them: of torsion springs that rest away from the start, and of stops.
+
+    The stops of a hinge are stated from its start, where a torsion spring in its place measures its angle. Raises
+    InputError of data that are no scene.
+    """
     from shoal.mechanics.assembly.loads import Loads
     from shoal.mechanics.assembly.placement import place
     from shoal.mechanics.derived import RowAllocator
 
-    if away:
+    hinges = {name: one for name, one in data["joints"].items() if "stops" in one and one["kind"] == "revolute"}
+    measures = {
+        f"stops-of-{name}": {
+            "kind": "torsion-spring",
+            "stiffness": 1.0,
+            **{key: one[key] for key in ("first", "second", "axis")},
+        }
+        for name, one in hinges.items()
+    }
+    free = {name: {key: part for key, part in one.items() if key != "stops"} for name, one in data["joints"].items()}
+    scene = Scene.parse(data | {"joints": free, "loads": data.get("loads", {}) | measures}, file)
+    if away or measures:
         loads = Loads(scene, place(scene), RowAllocator(0), 0.0)
-        start = dict(zip(loads.names, loads.angles, strict=True))
+        start = {name: float(np.ravel(angle)[0]) for name, angle in zip(loads.names, loads.angles, strict=True)}
         for name, angle in away.items():
-            data["loads"][name]["angle"] = float(np.ravel(start[name])[0]) + angle
+            data["loads"][name]["angle"] = start[name] + angle
+        for name, one in hinges.items():
+            one["stops"] = {side: limit + start[f"stops-of-{name}"] for side, limit in one["stops"].items()}

@@ -1,9 +1,10 @@
-"""What acts in joints: damping, dry friction and springs, and the laws of springs."""
+"""What acts in joints: damping, dry friction, springs and limits, and the laws of springs."""
 
 from __future__ import annotations
 
 from typing import Any
 
+from shoal.imported.limits import add_stops
 from shoal.imported.parts import Parts
 from shoal.imported.rounding import numbers
 from shoal.imported.source import Array, Source
@@ -20,13 +21,14 @@ def law(stiffness: float, further: Array) -> dict[str, Any]:
 
 
 def add_resistance(source: Source, own: list[int], made: dict[str, Any], parts: Parts) -> None:
-    """Adds damping and friction of joints to the one made for them, and their springs to the loads; lines for the rest.
+    """Add damping, friction and limits to the joint made for others, and springs to the loads; lines for the rest.
 
     made: a joint of a scene, or its kind alone where nothing can act in it. own: the joints that it stands for.
     """
     for one in own:
         _add_friction(source, one, made, parts)
         _add_spring(source, one, made, parts)
+        add_stops(source, one, made, _is_simple(source, one, made), parts)
         _tell_rest(source, one, parts)
 
 
@@ -73,9 +75,6 @@ def _add_spring(source: Source, one: int, made: dict[str, Any], parts: Parts) ->
 def _tell_rest(source: Source, one: int, parts: Parts) -> None:
     """Lines for what no joint of a scene has."""
     model, name, dof = source.model, source.joint_names[one], source.model.jnt_dofadr[one]
-    if model.jnt_limited[one]:
-        low, high = model.jnt_range[one]
-        parts.left_out.append(f"joint {name}: its limits {low:g} to {high:g}")
     if model.dof_armature[dof]:
         parts.left_out.append(f"joint {name}: its armature {model.dof_armature[dof]:g}")
 

@@ -6,13 +6,14 @@ from typing import Any
 
 import numpy as np
 
+from shoal.imported.limits import add_ropes
 from shoal.imported.parts import Parts
 from shoal.imported.source import Source
 from shoal.imported.springs import law
 
 
 def add_tendons(source: Source, parts: Parts) -> None:
-    """Adds tendons between two sites: springs, and distances where an equality keeps their length; lines for others."""
+    """Add tendons between two sites: springs, ropes, struts, and distances that an equality keeps; lines for others."""
     names = source.called(source.mujoco.mjtObj.mjOBJ_TENDON, source.model.ntendon, "tendon")
     lengths = _lengths(source)
     for number, name in enumerate(names):
@@ -26,6 +27,7 @@ def add_tendons(source: Source, parts: Parts) -> None:
         first = source.model.tendon_adr[number]
         one, other = (source.at_site(end) for end in source.model.wrap_objid[first : first + 2])
         sides = {"first": one, "second": other}
+        add_ropes(source, number, name, sides, parts)
         if number in lengths:
             parts.kept.add(lengths[number])
             parts.joints[name if name not in parts.joints else f"{name}-length"] = {"kind": "distance", **sides}
@@ -55,7 +57,6 @@ def _further(source: Source, number: int) -> list[str]:
     """What a tendon has and a spring has not."""
     model = source.model
     every = (
-        (model.tendon_limited, "limits"),
         (model.tendon_frictionloss, "frictionloss"),
         (model.tendon_armature, "armature"),
         (model.tendon_springyield, "springyield"),
