@@ -124,7 +124,7 @@ def prepare(asked: OfScene) -> Prepared:
     """
     from shoal.engines.prepared import Prepared
 
-    return Prepared(machine(asked).model_copy(deep=True))
+    return Prepared(machine(asked))
 
 
 @function(Select)

@@ -14,8 +14,9 @@ import shoal
 from shoal.engines import get_engine
 from shoal.engines.prepared import Prepared
 from shoal.errors import InputError
-from shoal.mechanics.integrators import INTEGRATORS
-from shoal.scene import load_scene, scene_names
+from shoal.mechanics import simulate as simulating
+from shoal.mechanics.integrators import INTEGRATORS, pick
+from shoal.scene import Scene, load_scene, scene_names
 from shoal.trajectory import Status, Trajectory
 
 FLEXIBLE = load_scene("flexible-double-pendulum")
@@ -144,3 +145,38 @@ def test_bad_questions_are_refused_each_time() -> None:
             prepared({"bodies.OA.colour": 1.0})
         with pytest.raises(InputError, match="bodies"):
             prepared({"bodies.OA.length": np.array([1.0, -1.0])}, [0.1])
+
+
+@pytest.mark.parametrize(("axis", "shared"), [([0, 0, 1], True), ([1, 0, 1], False)])
+def test_lanes_in_space_share_the_model_unless_joints_take_numbers_from_their_start(
+    axis: list[float], shared: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = Scene.parse({
+        "name": "pendulum", "dimensions": 3,
+        "bodies": {"OA": {"kind": "rod", "length": 1.0, "height": 0.1, "width": 0.05, "density": 1000.0}},
+        "joints": {"O": {"kind": "revolute", "first": {"body": "ground", "point": [0, 0, 0]}, "second": {"body": "OA"},
+                         "axis": axis}},
+        "markers": {"A": {"body": "OA", "point": "end"}},
+        "initial": {"OA": {"angle": 0.3}},
+        "solver": {"integrator": "rk4", "step": 1e-2, "duration": 0.2},
+    })  # fmt: skip
+    angles, times = np.array([0.3, 0.8, 1.3]), [0.1, 0.2]
+    run = Prepared(scene)
+    assert run(times=times).ok
+    made = []
+    monkeypatch.setattr(simulating, "pick", lambda *asked: made.append(asked) or pick(*asked))
+    found = run({"initial.OA.angle": angles}, times)
+    assert found.ok
+    assert len(made) == (not shared)
+    for lane, angle in enumerate(angles):
+        alone = Prepared(scene.with_values({"initial.OA.angle": float(angle)}))(times=times)
+        np.testing.assert_allclose(found.points[..., lane], alone.points[..., 0], atol=1e-12)
+
+
+def test_later_changes_of_a_scene_do_not_reach_it() -> None:
+    scene = load_scene("single-pendulum")
+    run = Prepared(scene)
+    before = run(times=[0.1]).points
+    dict.clear(scene.initial)
+    dict.clear(run.scene.initial)
+    assert np.array_equal(run(times=[0.1]).points, before)

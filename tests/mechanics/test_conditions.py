@@ -57,7 +57,7 @@ def test_the_jacobian_of_a_closure_is_its_derivative(kind: str) -> None:
     v = random.normal(size=(4, 6))
     assert rows.along(v) == pytest.approx(np.einsum("lri,li->lr", rows.slope, v), abs=1e-12)
     for lane in range(4):
-        alone = closure.of_lane(lane).rows(begin[lane : lane + 1])
+        alone = closure.of_lanes(np.array([lane])).rows(begin[lane : lane + 1])
         assert alone.gap[0] == pytest.approx(rows.gap[lane], abs=1e-15)
 
 

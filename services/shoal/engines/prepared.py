@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -27,27 +28,29 @@ class Prepared:
     """A scene that the native solver simulates repeatedly; call it to simulate.
 
     What depends on the scene alone is computed once and kept by its `Machine`: its model, its integrator and stability
-    limit, its reach and its start. Repeated runs use it, in memory that exists already. Threads may call it at the same
-    time: each call takes a work space of its own.
-
-    Attributes:
-        scene: the scene
+    limit, its reach and its start. Repeated runs use it, in memory that exists already. Later changes to the mappings
+    of the given scene do not reach it. Threads may call it at the same time: each call takes a work space of its own.
     """
 
     def __init__(self, scene: Scene, threads: int | None = None) -> None:
         check_acceleration(scene)
-        self.scene = scene
         self._threads = threads
         self._machine = Machine.of(scene)
+        self._scene = self._machine.scene.model_copy(update={"solver": scene.solver})
         self._checked: dict[tuple[str, tuple[int, ...], bytes], Array] = {}
         self._set: dict[str, Prepared] = {}
 
+    @cached_property
+    def scene(self) -> Scene:
+        """A copy of the scene, as scenes of equal content share what is kept."""
+        return self._scene.model_copy(deep=True)
+
     def __reduce__(self) -> tuple[Any, ...]:
         # What is kept holds addresses of this process.
-        return Prepared, (self.scene, self._threads)
+        return Prepared, (self._scene, self._threads)
 
     def __repr__(self) -> str:
-        return f"Prepared({self.scene.name})"
+        return f"Prepared({self._scene.name})"
 
     def __call__(
         self,
@@ -69,19 +72,19 @@ class Prepared:
                 lanes, times, whole=whole
             )
         wanted = self._wanted(times)
-        alone = self.scene.alone(lanes)
+        alone = self._scene.alone(lanes)
         if alone is not None:
             raise InputError(f"{alone}: cannot differ from lane to lane; call once for each of its values")
         if lanes:
-            count = check_lanes(self.scene, lanes, self._machine.kept("accepted", Extremes))
-            if is_moved_by_swarm(self.scene):
-                return swarm_motion.simulate(swarm_motion.only_lane(self.scene, lanes, count), wanted)
-            return simulate(self.scene, wanted, lanes, threads=self._threads, machine=self._machine, whole=whole)
-        if is_moved_by_swarm(self.scene):
-            return swarm_motion.simulate(self.scene, wanted)
-        first = simulate(self.scene, wanted, threads=self._threads, machine=self._machine, whole=whole)
+            count = check_lanes(self._scene, lanes, self._machine.kept("accepted", Extremes))
+            if is_moved_by_swarm(self._scene):
+                return swarm_motion.simulate(swarm_motion.only_lane(self._scene, lanes, count), wanted)
+            return simulate(self._scene, wanted, lanes, threads=self._threads, machine=self._machine, whole=whole)
+        if is_moved_by_swarm(self._scene):
+            return swarm_motion.simulate(self._scene, wanted)
+        first = simulate(self._scene, wanted, threads=self._threads, machine=self._machine, whole=whole)
         return first_believed(
-            self.scene, first, lambda other: simulate(other, wanted, threads=self._threads, whole=whole)
+            self._scene, first, lambda other: simulate(other, wanted, threads=self._threads, whole=whole)
         )
 
     def _with(self, values: dict[str, Any]) -> Prepared:
@@ -89,30 +92,25 @@ class Prepared:
         key = repr(values)
         found = self._set.get(key)
         if found is None:
-            found = self._set[key] = Prepared(self.scene.with_values(values), self._threads)
+            found = self._set[key] = Prepared(self._scene.with_values(values), self._threads)
             _forget(self._set)
         return found
 
     def _wanted(self, times: Sequence[float] | Array | None) -> Array:
         if times is None:
-            return sampling_times(self.scene, None)
+            return sampling_times(self._scene, None)
         given = times if type(times) is np.ndarray else numbers("times", times, "times in s")
         key = given.dtype.str, given.shape, given.tobytes()
         wanted = self._checked.get(key)
         if wanted is None:
-            wanted = self._checked[key] = sampling_times(self.scene, given)
+            wanted = self._checked[key] = sampling_times(self._scene, given)
             _forget(self._checked)
         return wanted.copy()
 
 
 def prepared(scene: Scene, threads: int | None = None) -> Prepared:
     """Return a scene for repeated runs, made now or by an earlier call."""
-    machine = Machine.of(scene)
-
-    def make() -> Prepared:
-        return Prepared(machine.scene.model_copy(update={"solver": scene.solver}), threads)
-
-    return machine.kept(("prepared", scene.solver, threads), make)
+    return Machine.of(scene).kept(("prepared", scene.solver, threads), lambda: Prepared(scene, threads))
 
 
 def _of_lanes(value: Any) -> bool:

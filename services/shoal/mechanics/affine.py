@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shoal.mechanics import plane
-from shoal.mechanics.numerics.tile import Array, Number
+from shoal.mechanics.numerics.tile import Array, Index, Number
 
 NEGLIGIBLE = 1e-12
 """Coefficients of unit vectors, and places in parts of the machine's size, that are round-off: some thousand eps."""
@@ -123,11 +123,26 @@ class Points(NamedTuple):
 
 def points(vectors: Sequence[Affine], unknowns: int, lane: int = 0) -> Points:
     """Vectors of a placement as one matrix, in one of its lanes."""
+    matrix, constant = matrices(vectors, unknowns, np.array([lane]))
+    return Points(matrix[0], constant[0])
+
+
+def matrices(vectors: Sequence[Affine], unknowns: int, lanes: Index) -> tuple[Array, Array]:
+    """Return matrices (lanes or 1, vectors, d, unknowns) and constants (lanes or 1, vectors, d) of vectors.
+
+    lanes: numbers of those of the placement that are wanted; 1 where all have the same
+    """
+    parts = [part.shape[1] for vector in vectors for part in (vector.constant, *vector.terms.values())]
+    count = len(lanes) if max(parts, default=1) > 1 else 1
     dimensions = len(vectors[0].constant) if vectors else plane.DIMENSIONS
-    matrix = np.zeros((len(vectors), dimensions, unknowns))
-    constant = np.zeros((len(vectors), dimensions))
+    matrix = np.zeros((count, len(vectors), dimensions, unknowns))
+    constant = np.zeros((count, len(vectors), dimensions))
     for k, vector in enumerate(vectors):
-        constant[k] = vector.constant[:, lane % vector.constant.shape[1]]
+        constant[:, k] = _of_lanes(vector.constant, lanes).T
         for unknown, coefficient in vector.terms.items():
-            matrix[k, :, unknown] += coefficient[:, lane % coefficient.shape[1]]
-    return Points(matrix, constant)
+            matrix[:, k, :, unknown] += _of_lanes(coefficient, lanes).T
+    return matrix, constant
+
+
+def _of_lanes(u: Array, lanes: Index) -> Array:
+    return u if u.shape[1] == 1 else u[:, lanes % u.shape[1]]

@@ -7,7 +7,7 @@ hold, then those of markers).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -174,6 +174,11 @@ class Model:
         """Unknowns plus derived rows."""
         return self.unknowns + len(self.derived.start) - 1
 
+    def differs_in_start_only(self, other: Model) -> bool:
+        """Return whether another model is the same but for its start and its lanes."""
+        names = (one.name for one in fields(self) if one.compare and one.name not in _OF_START)
+        return all(_equal(getattr(self, name), getattr(other, name)) for name in names)
+
     def function(self, number: int) -> Piecewise:
         """One of the functions."""
         first, last = self.functions.start[number : number + 2]
@@ -309,6 +314,22 @@ class Model:
         )
 
 
+def _equal(one: Any, other: Any) -> bool:
+    """Return whether two structures hold equal numbers, whether stated by lane or for all lanes."""
+    if isinstance(one, np.ndarray) and isinstance(other, np.ndarray):
+        by_lane = one.ndim == other.ndim == 2 and 1 in (one.shape[1], other.shape[1])
+        return one.shape[: 1 if by_lane else None] == other.shape[: 1 if by_lane else None] and bool(
+            np.all(one == other)
+        )
+    if isinstance(one, tuple) and isinstance(other, tuple):
+        return len(one) == len(other) and all(map(_equal, one, other))
+    if isinstance(one, dict) and isinstance(other, dict):  # entries of a matrix
+        return one.keys() == other.keys() and all(np.all(value == other[key]) for key, value in one.items())
+    return bool(one == other)
+
+
+_OF_START = ("scene", "stated", "failed", "frames", "lanes", "q0", "v0", "start_angles", "gap_angles", "marker_angles")
+"""Fields of a model that its start decides, with the frames, whose numbers its arrays hold."""
 REFINEMENTS = 4
 """Each leaves the part `masses.THIN` of what there was to take back, so that round-off is left."""
 _SINGULAR = 1e14

@@ -98,15 +98,16 @@ class Runs:
         single = self._alone and model is None
         turns = self._turns if model is None else _turns(self.scene, model)
         moved = self.model if model is None else model
-        most = threads or os.cpu_count() or 1
         parts = self._parts(moved.lanes)
+        workers = 1 if len(parts) == 1 else min(threads or os.cpu_count() or 1, len(parts))
         d = moved.dimensions
         motion = np.empty((len(times), len(self.scene.markers), 2 * d + 2, moved.lanes))
         numbers = np.empty((NUMBERS, moved.lanes))
         limits, floor = self._limits, self._limits.energy_floor(end)
         left: list[tuple[Array, Array, Array]] = []
         happened: list[dict[str, Any]] = []
-        states, stop = States.room(moved, len(times)) if whole else None, Event()
+        states = States.room(moved, len(times)) if whole else None
+        stop = Event() if workers > 1 else None
 
         def march(part: slice) -> None:
             count = part.stop - part.start
@@ -127,7 +128,6 @@ class Runs:
             if seek is None and self._alike and space.size <= LARGEST:
                 idle.append(space)
 
-        workers = min(most, len(parts))
         if end == 0.0 and seek is None and self._alike and not self.model.constraints.size:
             self._still.fill(moved, turns, limits.anchors, motion, numbers)
             states = None if states is None else states._replace(q=moved.q0[None].copy(), v=moved.v0[None].copy())
@@ -141,6 +141,7 @@ class Runs:
             try:
                 list(_pool(workers).map(march, parts))
             except BaseException:
+                assert stop is not None
                 stop.set()
                 raise
         findings = limits.check(numbers, self.choice, moved.failed)

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from shoal.compile import clock, deferred
+from shoal.errors import InputError
 from shoal.mechanics.assembly.build import build
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.inertia_cap import capped
@@ -50,10 +51,14 @@ def simulate(
         return own.run(times, threads=threads, seek=seek, begin=begin, whole=whole)
     lanes = len(next(iter(values.values())))
     found = scene.initial_from is not None
-    if all(path.startswith("initial.") for path in values) and not start.gives_numbers(scene) and not found:
+    starting = all(path.startswith("initial.") for path in values) and not found
+    if starting and not start.gives_numbers(scene):
         own = runs(machine or Machine.of(scene), scene.solver, end)
         return own.run(times, own.starts.at(values, lanes), threads=threads, begin=begin, whole=whole)
     model = build(scene.with_lanes(values), lanes, max(end, scene.solver.duration))
+    same = _runs_if_any(machine or Machine.of(scene), scene.solver, end) if starting else None
+    if same is not None and model.differs_in_start_only(same.model):  # joints take nothing else from the start
+        return same.run(times, model, threads=threads, begin=begin, whole=whole)
     each = ({path: float(numbers[lane]) for path, numbers in values.items()} for lane in range(lanes))
     model = _begun(model, [scene.with_values(one) for one in each] if found else [])
     model = _as_moved(model, scene.solver)
@@ -74,6 +79,18 @@ def runs(machine: Machine, solver: Solver, end: float) -> Runs:
         return Runs(machine.scene.model_copy(update={"solver": solver}), model, pick(solver, model, limit))
 
     return machine.kept(("runs", solver, horizon, moving), make)
+
+
+def _runs_if_any(machine: Machine, solver: Solver, end: float) -> Runs | None:
+    """Return the same; None where the machine has no start of its own."""
+
+    def make() -> tuple[Runs | None]:
+        try:
+            return (runs(machine, solver, end),)
+        except InputError:
+            return (None,)
+
+    return machine.kept(("runs if any", solver, max(end, solver.duration), end > 0), make)[0]
 
 
 def stable_step(scene: Scene, integrator: str) -> float:

@@ -53,11 +53,11 @@ class TermValues:
         """Second derivatives of the terms by time at coordinates that rest, (terms,)."""
         return np.array([0.0 if drive is None else start_bend(drive) for drive in self._drives])
 
-    def of_lane(self, lane: int) -> TermValues:
-        """Return the terms of one lane."""
+    def of_lanes(self, lanes: Index) -> TermValues:
+        """Return the terms of some lanes."""
         other = copy(self)
         for name in ("_constant", "offset", "_coefficients", "_factors"):
-            setattr(other, name, one_lane(getattr(self, name), lane))
+            setattr(other, name, of_lanes(getattr(self, name), lanes))
         return other
 
     def at(self, q: Array) -> tuple[Array, Array]:
@@ -129,6 +129,6 @@ def laned(parts: Sequence[Array], shape: tuple[int, ...]) -> Array:
     return np.array(each, dtype=float).reshape(-1, lanes, *shape).swapaxes(0, 1)
 
 
-def one_lane(values: Array, lane: int) -> Array:
-    """Values of a lane, (1, ...), of those of all or of one for all."""
-    return values[lane : lane + 1] if len(values) > 1 else values
+def of_lanes(values: Array, lanes: Index) -> Array:
+    """Return the values of some lanes, of those of all or of one for all, (1, ...)."""
+    return values[lanes] if len(values) > 1 else values

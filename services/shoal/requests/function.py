@@ -72,7 +72,7 @@ def stated(public: Any, args: tuple[Any, ...], kwargs: Mapping[str, Any], depth:
         warnings.warn(f"{public.__name__}: {note}", FutureWarning, stacklevel=depth + 2)
 
     given = renamed(public.request, kwargs, say)
-    return dict(inspect.signature(public).bind(*args, **given).arguments)
+    return dict(public.__signature__.bind(*args, **given).arguments)
 
 
 def _signature(request: Any, compute: Callable[..., Any]) -> inspect.Signature:

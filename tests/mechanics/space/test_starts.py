@@ -8,9 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 from shoal.errors import InputError
+from shoal.mechanics.assembly.build import build
 from shoal.mechanics.assembly.space import start
+from shoal.mechanics.frames import RigidFrame
 from shoal.mechanics.simulate import simulate
 from shoal.mechanics.start.closure import Closure
+from shoal.mechanics.start.start import body_states
 from shoal.scene import Scene
 from shoal.trajectory import Status
 
@@ -301,3 +304,53 @@ def test_rates_that_a_drive_leaves_open_are_those_of_the_plane(seed: int, closin
     assert plane.ok
     assert space.ok
     assert space.points[:, :, :2] == pytest.approx(plane.points, abs=1e-11)
+
+
+def four_bar_in_space() -> Scene:
+    """A crank and a rocker about axes that cross, and a coupler between two ball joints."""
+    bar = {"kind": "rod", "height": 0.02, "width": 0.02, "density": 2700.0, "rotary_inertia": True}
+    return Scene.parse({
+        "name": "four-bar-in-space", "dimensions": 3,
+        "bodies": {name: {**bar, "length": length} for name, length in
+                   (("crank", 0.3), ("coupler", 1.0), ("rocker", 0.8))},
+        "joints": {
+            "A": {"kind": "revolute", "first": {"body": "ground", "point": [0, 0, 0]}, "second": {"body": "crank"},
+                  "axis": [0, 0, 1]},
+            "B": {"kind": "spherical", "first": {"body": "crank", "point": "end"}, "second": {"body": "coupler"}},
+            "C": {"kind": "spherical", "first": {"body": "coupler", "point": "end"},
+                  "second": {"body": "rocker", "point": "end"}},
+            "D": {"kind": "revolute", "first": {"body": "ground", "point": [1, 0.2, 0]}, "second": {"body": "rocker"},
+                  "axis": [0, 1, 0]},
+        },
+        "markers": {"C": {"body": "coupler", "point": "end"}},
+        "initial": {"crank": {"angle": 0.5, "spin": [0, 0, 3.0]}},
+        "solver": {"integrator": "rk4", "step": 1e-3},
+    })  # fmt: skip
+
+
+def test_rates_of_many_lanes_are_those_of_a_few_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = four_bar_in_space()
+    lengths = np.array([*np.linspace(0.9, 1.1, 4), 2.5, *np.linspace(0.9, 1.1, 3)])
+    lanes = scene.with_lanes({"bodies.coupler.length": lengths, "bodies.crank.density": np.linspace(1e3, 9e3, 8)})
+    model = build(lanes, 8)
+    assert np.flatnonzero(model.failed).tolist() == [4]
+    spin = body_states(model.frames, model.scene, model.q0, model.v0)["crank"].spin
+    np.testing.assert_allclose(np.transpose(spin)[~model.failed], [[0.0, 0.0, 3.0]] * 7, atol=1e-9)
+    monkeypatch.setattr(start, "AT_ONCE", 3)
+    np.testing.assert_allclose(build(lanes, 8).v0, model.v0, atol=1e-12)
+
+
+def test_a_guessed_rate_is_kept_in_those_lanes_whose_joints_allow_it() -> None:
+    """In the second the ends of the coupler move otherwise; it still turns about the line through them as guessed."""
+    scene = four_bar_in_space()
+    alone = build(scene)
+    begun = body_states(alone.frames, alone.scene, alone.q0[:, 0], alone.v0[:, 0])
+    rocking, turning = (np.array(begun[name].spin) for name in ("rocker", "coupler"))
+    frame = alone.frames["coupler"]
+    assert isinstance(frame, RigidFrame)
+    along = 5.0 * frame.directors[0].at(alone.q0[:, 0])
+    guessed = scene.with_values({"initial.rocker.spin": tuple(rocking), "initial.coupler.spin": tuple(turning + along)})
+    model = build(guessed.with_lanes({"initial.rocker.spin.1": rocking[1] * np.array([1.0, 2.0])}), 2)
+    found = body_states(model.frames, model.scene, model.q0, model.v0)["coupler"].spin
+    np.testing.assert_allclose(np.transpose(found), [turning + along, 2.0 * turning + along], atol=1e-9)
+    assert not np.any(model.failed)

@@ -17,7 +17,7 @@ from shoal.mechanics import rotation as turns
 from shoal.mechanics.numerics.tile import Array, Flags, Index
 from shoal.mechanics.plane import phasor
 from shoal.mechanics.start.rigid_bodies import ANGLE, PLACE, RigidBodies
-from shoal.mechanics.term_values import TermValues, laned, one_lane
+from shoal.mechanics.term_values import TermValues, laned, of_lanes
 from shoal.scene import Scene
 
 POSE = 3
@@ -143,13 +143,13 @@ class Closure:
         other.begin, other.own, other._at_start = Poses.of(begin, self._bodies), own, None
         return other
 
-    def of_lane(self, lane: int) -> Closure:
-        """Return the joints of one lane, with what they keep."""
+    def of_lanes(self, lanes: Index) -> Closure:
+        """Return the joints of some lanes, with what they keep."""
         other = copy(self)
-        other._terms = self._terms.of_lane(lane)
-        other._vectors, other._rates = one_lane(self._vectors, lane), one_lane(self._rates, lane)
-        other.begin = Poses(*(part[lane : lane + 1] for part in self.begin))
-        other._at_start = one_lane(self._values_at_start, lane)
+        other._terms = self._terms.of_lanes(lanes)
+        other._vectors, other._rates = of_lanes(self._vectors, lanes), of_lanes(self._rates, lanes)
+        other.begin = Poses(*(of_lanes(part, lanes) for part in self.begin))
+        other._at_start = of_lanes(self._values_at_start, lanes)
         return other
 
     @property

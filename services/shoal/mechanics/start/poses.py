@@ -124,6 +124,8 @@ class Assembly:
         self.closure = Closure(scene, self.guess, bodies=bodies)
         self._sought: dict[tuple[bytes, bytes], Placed] = {}
         """What was looked for before: where it is not there, the reason is sought by the same steps."""
+        self._left_free = (b"", b""), self._columns
+        """Coordinates and what is kept of them, as bytes, and which columns these and the joints leave free."""
         self.effort = 0
         """Residuals evaluated while closing joints, those of many lanes at once counted once."""
 
@@ -134,10 +136,14 @@ class Assembly:
         if attempt:
             rng = np.random.default_rng(attempt)
             shaken = min(0.3 * attempt, np.pi) * rng.uniform(-1.0, 1.0, shaken.shape)
-        turn = shaken * ~keep.reshape(len(keep), count, -1)[..., self.turns]
+        turn = shaken * ~self._turning(keep)
         if self._begin is None:
             return self.walk.poses(self.angles + turn[..., 0], self.rates)[0]
         return self._begin.moved(np.pad(turn, ((0, 0), (0, 0), (len(self.turns), 0)))).numbers
+
+    def _turning(self, columns: Flags) -> Flags:
+        """Return those of columns (lanes, columns) that are turns, (lanes, bodies, turns)."""
+        return columns.reshape(len(columns), len(self.scene.bodies), -1)[..., self.turns]
 
     def held(self, chosen: Iterable[Statement], near: Array | None = None) -> tuple[Flags, Array]:
         """Return flags of the columns that statements fix, (lanes, columns), and poses with them, else near others."""
@@ -181,6 +187,8 @@ class Assembly:
     def _seek(self, chosen: Sequence[Statement], near: Array | None, most: int) -> Placed:
         fixed, best = self.held(chosen)
         first, ok = best, np.zeros(self.lanes, dtype=bool)
+        if np.all(self._turning(fixed)):  # every guess is the first
+            most = 1 if near is None else 2
         for own in (True, False) if self._own else (True,):
             closure = self.closure.at(first, own)
             for attempt in range(most):
@@ -228,11 +236,9 @@ class Assembly:
         length = np.where(closure.angular, 1.0, self.size) / (1.0 if weight is None else weight)
 
         def evaluate(poses: Array, lanes: Index) -> tuple[Array, Array]:
-            every = u.copy()
-            every[lanes] = poses
-            rows = closure.rows(every)
+            rows = (closure if len(lanes) == len(u) else closure.of_lanes(lanes)).rows(poses)
             self.effort += len(rows.names)
-            return (rows.gap / length)[lanes], (rows.slope / length[:, None])[lanes]
+            return rows.gap / length, rows.slope / length[:, None]
 
         def solve(gap: Array, slope: Array, damping: Array, lanes: Index) -> Array:
             # Displacements of least size, J W J' + mu |gap| in units of the rows (Yamashita and Fukushima 2001).
@@ -292,8 +298,11 @@ class Assembly:
 
     def _free(self, one: Statement, u: Array, kept: Flags) -> Flags:
         """Return whether the joints and what is kept leave the columns of a statement free, (lanes, columns)."""
-        slope = self.closure.at(u, own=False).rows(u).slope * np.sqrt(np.where(kept, 0.0, self.give))[:, None, :]
-        basis = np.linalg.svd(slope, full_matrices=False)
-        rank = DEPENDENT * np.max(basis.S, axis=1, initial=1e-300, keepdims=True) < basis.S
-        determined = np.einsum("lri,lr->li", basis.Vh**2, rank.astype(float))
-        return np.asarray(1.0 - determined[:, one.columns] > DEPENDENT)
+        state = u.tobytes(), kept.tobytes()
+        if self._left_free[0] != state:
+            slope = self.closure.at(u, own=False).rows(u).slope * np.sqrt(np.where(kept, 0.0, self.give))[:, None, :]
+            basis = np.linalg.svd(slope, full_matrices=False)
+            rank = DEPENDENT * np.max(basis.S, axis=1, initial=1e-300, keepdims=True) < basis.S
+            determined = np.einsum("lri,lr->li", basis.Vh**2, rank.astype(float))
+            self._left_free = state, 1.0 - determined > DEPENDENT
+        return self._left_free[1][:, one.columns]

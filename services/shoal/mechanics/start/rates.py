@@ -113,7 +113,7 @@ class Velocities:
             left = np.linalg.svd(slope / (np.linalg.norm(slope, axis=1, keepdims=True) + 1e-300))
             rank = int(np.sum(left.S > SINGULAR))
             null = left.U[:, rank:].T / (np.linalg.norm(slope, axis=1) + 1e-300)
-            bend = _Bend(self.closure.of_lane(int(lane)), self.poses[lane], null, keep, units)
+            bend = _Bend(self.closure.of_lanes(np.array([lane])), self.poses[lane], null, keep, units)
             free = basis.rest(int(lane))
             found = bend.nearest(rates[lane], free, self.speed / self.size)
             ok[lane] = found is not None

@@ -43,7 +43,7 @@ def require_unlocked(scene: Scene, terms: Sequence[Term], q: Array) -> None:
     if not terms or len(q) >= LARGEST:
         return
     length = np.array([_uncancelled(term, q) for term in terms])
-    values = TermValues(terms, 3).of_lane(0)
+    values = TermValues(terms, 3).of_lanes(np.zeros(1, dtype=np.int64))
 
     def gap(q: Array) -> Array:
         return np.asarray(values.at(q[None])[0][0] / length)

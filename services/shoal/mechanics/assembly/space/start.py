@@ -6,7 +6,7 @@ values are kept exactly if possible; all others follow from them, with the least
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from typing import NamedTuple
 
@@ -15,14 +15,14 @@ import numpy as np
 from shoal.errors import InputError
 from shoal.mechanics import reach
 from shoal.mechanics import rotation as turns
-from shoal.mechanics.affine import points
+from shoal.mechanics.affine import Affine, matrices
 from shoal.mechanics.assembly.groups import is_stiff
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
 from shoal.mechanics.assembly.space.locking import require_unlocked
 from shoal.mechanics.assembly.space.placement import place_in_space
 from shoal.mechanics.assembly.space.rigid_bodies import SpatialBodies
 from shoal.mechanics.frames import BeamFrame, RigidFrame
-from shoal.mechanics.numerics.tile import Array, Flags, stacked
+from shoal.mechanics.numerics.tile import Array, Flags, Index, Number, stacked
 from shoal.mechanics.start.closure import Closure, Poses
 from shoal.mechanics.start.poses import CLOSED, ROUNDING, Assembly, Statement, stated
 from shoal.mechanics.start.start import place_at, pose_refused
@@ -44,21 +44,42 @@ def place_started(scene: Scene) -> SpatialPlacement:
     return _Start(scene).run()
 
 
+AT_ONCE = 64
+"""Lanes whose rates are found in one batch: the memory of their matrices, (unknowns, unknowns) each, stays bounded."""
+
+
 class _Wish(NamedTuple):
-    """Equations rows v = values of the rates of one lane, (equations, unknowns) and (equations,)."""
+    """Equations rows v = values of the rates, (lanes or 1, equations, unknowns) and (lanes or 1, equations).
+
+    allowed: orthonormal residuals that count for nothing, (lanes, equations, ...)
+    """
 
     rows: Array
     values: Array
     stated: Statement | None = None
+    allowed: Array | None = None
 
     @property
     def is_firm(self) -> bool:
         """Return whether it is a statement, and not a guess."""
         return self.stated is not None and self.stated.firm
 
-    def off(self, v: Array) -> float:
-        """Return the largest residual at rates."""
-        return float(np.max(np.abs(self.rows @ v - self.values), initial=0.0))
+    def left(self, v: Array) -> Array:
+        """Return the residuals at rates (lanes, unknowns), (lanes, equations)."""
+        return self._counting((self.rows @ v[..., None]) - self.values[..., None])[..., 0]
+
+    def off(self, v: Array) -> Array:
+        """Return the largest residual at rates, (lanes,)."""
+        return np.asarray(np.max(np.abs(self.left(v)), axis=1, initial=0.0))
+
+    def of(self, chosen: Flags) -> _Wish:
+        """Return the equations of some lanes, which ask for nothing in the others, and allow for nothing."""
+        return _Wish(self._counting(self.rows) * chosen[:, None, None], self.values * chosen[:, None])
+
+    def _counting(self, residuals: Array) -> Array:
+        if self.allowed is None:
+            return residuals
+        return np.asarray(residuals - self.allowed @ (self.allowed.swapaxes(1, 2) @ residuals))
 
 
 class _Start:
@@ -99,11 +120,13 @@ class _Start:
             require_unlocked(self.scene, self.terms, self.q[:, 0])
         heavy = lanes_of(self.scene.bodies)
         # The least kinetic energy depends on masses.
-        if heavy > self.lanes and not failed[0] and not self._moves(0):
+        if heavy > self.lanes and not failed[0] and not self._moves(np.zeros(1, dtype=np.int64))[0]:
             self._spread(heavy)
             failed = np.repeat(failed, heavy)
-        for moving in np.flatnonzero(~failed):
-            failed[moving] |= not self._move(int(moving))
+        moving = np.flatnonzero(~failed)
+        for first in range(0, len(moving), AT_ONCE):
+            lanes = moving[first : first + AT_ONCE]
+            failed[lanes] = ~self._move(lanes)
         self.placement.positions, self.placement.velocities = list(self.q), list(self.v)
         self.placement.terms.begin(lambda vector: place_at(vector, self.q))
         self.placement.failed = failed
@@ -156,106 +179,132 @@ class _Start:
         self._take(place_in_space(scene, {name: (place, axes) for name, place, axes in each}))
         return chosen & ~found.ok
 
-    def _moving(self, lane: int) -> tuple[_Wish, float]:
-        """Return the constraints on the rates, by their scales, and the largest rate."""
+    def _moving(self, lanes: Index) -> tuple[_Wish, Array]:
+        """Return the constraints on the rates of some lanes, by their scales, and their largest rates."""
         scale = np.array([self.size**term.lengths for term in self.moving_terms])
-        slope = self.moving.of_lane(lane).jacobian(self.q[:, lane][None])[0] / scale[:, None]
-        return _Wish(slope, -self.moving.drift / scale), max(1.0, float(np.max(np.abs(self.v[:, lane]), initial=0.0)))
+        slope = self.moving.of_lanes(lanes).jacobian(self.q[:, lanes].T) / scale[:, None]
+        fastest = np.max(np.abs(self.v[:, lanes]), axis=0, initial=1.0)
+        return _Wish(slope, -self.moving.drift[None] / scale), np.asarray(fastest)
 
-    def _stated(self, lane: int) -> list[_Wish]:
+    def _vectors(self, vectors: Sequence[Affine], lanes: Index) -> tuple[Array, Array]:
+        """Return the matrices of vectors (see `affine.matrices`), and the vectors at the start, (lanes, vectors, 3)."""
+        matrix, constant = matrices(vectors, len(self.q), lanes)
+        flat = matrix.reshape(len(matrix), -1, len(self.q))
+        return matrix, (flat @ self.q[:, lanes].T[..., None]).reshape(len(lanes), len(vectors), 3) + constant
+
+    def _stated(self, lanes: Index) -> list[_Wish]:
         """Return the stated rates."""
-        found, q = [], self.q[:, lane]
+        found = []
         for one in stated(self.scene, self.lanes, RATES):
-            frame, values = self.placement.frames[one.body], one.values[lane]
+            frame, values = self.placement.frames[one.body], one.values[lanes]
             if one.quantity == "velocity":
-                found.append(_Wish(points([frame.point((0.0, 0.0, 0.0))], len(q), lane).matrix[0], values, one))
+                found.append(_Wish(self._vectors([frame.point((0.0, 0.0, 0.0))], lanes)[0][:, 0], values, one))
             elif isinstance(frame, RigidFrame):
-                directors = points(frame.directors, len(q), lane)
-                turning = np.cross(np.pad(values, (3 - len(values), 0)), directors.at(q))
-                found.append(_Wish(directors.matrix.reshape(9, len(q)), turning.ravel(), one))
+                matrix, directors = self._vectors(frame.directors, lanes)
+                spin = np.pad(values, ((0, 0), (3 - values.shape[1], 0)))
+                turning = np.cross(spin[:, None], directors).reshape(len(lanes), 9)
+                found.append(_Wish(matrix.reshape(len(matrix), 9, -1), turning, one))
         return found
 
-    def _straining(self, lane: int) -> Iterator[_Wish]:
+    def _straining(self, lanes: Index) -> Iterator[_Wish]:
         """Yield for every flexible rod the rates that vanish in rigid motions of its vectors.
 
         A rod starts as a rigid body moves, unless the joints forbid it.
         """
-        q = self.q[:, lane]
         for frame in self.placement.frames.values():
             if isinstance(frame, BeamFrame):
-                vectors = points(frame.vectors, len(q), lane)
-                turning = [-turns.skew(one) for one in vectors.at(q)]
-                moving = [np.eye(3) * (k % len(frame.nodes[0]) == 0) for k in range(len(turning))]
-                motions = np.linalg.svd(np.hstack([np.vstack(turning), np.vstack(moving)]), full_matrices=False)
-                rigid = motions.U[:, DEPENDENT * motions.S[0] < motions.S]
-                flat = vectors.matrix.reshape(-1, len(q))
-                yield _Wish(flat - rigid @ (rigid.T @ flat), np.zeros(len(flat)))
+                matrix, vectors = self._vectors(frame.vectors, lanes)
+                count = 3 * vectors.shape[1]
+                turning = -np.moveaxis(turns.skew(np.moveaxis(vectors, -1, 0)), (0, 1), (-2, -1))
+                places = np.arange(vectors.shape[1]) % len(frame.nodes[0]) == 0
+                moving = np.broadcast_to(places[:, None, None] * np.eye(3), turning.shape)
+                motions = np.linalg.svd(np.concatenate([turning, moving], 3).reshape(-1, count, 6), full_matrices=False)
+                rigid = motions.U * (DEPENDENT * motions.S[:, :1] < motions.S)[:, None]
+                yield _Wish(matrix.reshape(len(matrix), count, -1), np.zeros((1, count)), allowed=rigid)
 
-    def _moves(self, lane: int) -> bool:
-        """Return whether the rates satisfy the constraints and all statements, guesses included."""
-        constraints, pace = self._moving(lane)
-        every = (constraints, *self._stated(lane), *self._straining(lane))
-        return all(one.off(self.v[:, lane]) <= CLOSED * pace for one in every)
+    def _moves(self, lanes: Index) -> Flags:
+        """Return whether the rates satisfy the constraints and all statements, guesses included, (lanes,)."""
+        constraints, pace = self._moving(lanes)
+        every = (constraints, *self._stated(lanes), *self._straining(lanes))
+        return np.asarray(np.all([one.off(self.v[:, lanes].T) <= CLOSED * pace for one in every], axis=0))
 
-    def _move(self, lane: int) -> bool:
-        """Find rates that satisfy the constraints and the statements; return false if there are none."""
-        if self._moves(lane):
-            return True
-        (constraints, pace), asked, v = self._moving(lane), self._stated(lane), self.v[:, lane].copy()
-        root = np.linalg.cholesky(self._mass(lane))
+    def _move(self, lanes: Index) -> Flags:
+        """Find rates that satisfy the constraints and the statements; return which lanes have some, (lanes,)."""
+        found = self._moves(lanes)
+        if np.all(found):
+            return found
+        every, lanes = lanes, lanes[~found]
+        (constraints, pace), asked, v = self._moving(lanes), self._stated(lanes), self.v[:, lanes].T
+        root = np.linalg.cholesky(self._mass(lanes))
 
         def nearest(wish: _Wish, v: Array) -> Array:
-            move = np.linalg.lstsq(np.linalg.solve(root, wish.rows.T).T, wish.values - wish.rows @ v, DEPENDENT)[0]
-            return np.asarray(v + np.linalg.solve(root.T, move))
+            rows = np.linalg.solve(root, wish.rows.swapaxes(1, 2)).swapaxes(1, 2)
+            parts = np.linalg.svd(rows, full_matrices=False)
+            large = DEPENDENT * np.max(parts.S, axis=1, initial=0.0, keepdims=True) < parts.S
+            along = parts.U.swapaxes(1, 2) @ -wish.left(v)[..., None]
+            along *= (large / np.where(large, parts.S, 1.0))[..., None]
+            move = parts.Vh.swapaxes(1, 2) @ along
+            return np.asarray(v + np.linalg.solve(root.swapaxes(1, 2), move)[..., 0])
 
         firm = [one for one in asked if one.is_firm]
-        held = _joined([constraints, *firm])
+        held = _joined([constraints, *firm], len(lanes))
         v = nearest(held, v)
-        for wish in (*self._straining(lane), *(one for one in asked if not one.is_firm)):
-            more = _joined([held, wish])
-            if more.off(moved := nearest(more, v)) <= MET * pace:
-                v, held = moved, more
-        left = held.rows @ v - held.values
-        worst = int(np.argmax(np.abs(left))) if left.size else 0
-        if left.size and abs(left[worst]) > ROUNDING * pace:
-            if self.lanes == 1 and worst < len(constraints.values) and not firm:
+        for wish in (*self._straining(lanes), *(one for one in asked if not one.is_firm)):
+            more = _joined([held, wish.of(np.ones(len(lanes), dtype=bool))], len(lanes))
+            moved = nearest(more, v)
+            if np.any(kept := more.off(moved) <= MET * pace):
+                v, held = np.where(kept[:, None], moved, v), _joined([held, wish.of(kept)], len(lanes))
+        left = held.off(v)
+        stuck = left > ROUNDING * pace
+        if self.lanes == 1 and stuck[0] and not firm:
+            worst = int(np.argmax(np.abs(held.left(v)[0])))
+            if worst < len(self.moving_terms):
                 raise InputError(f"joints.{self.moving_terms[worst].name}: cannot begin to move as it is driven")
-            return self._kept(firm, v, 0.0)
-        if left.size and abs(left[worst]) > MET * pace:  # digits of stated rates: the joints come first
-            v = nearest(constraints, v)
-            if not self._kept(firm, v, ROUNDING * pace):
-                return False
-        self.v[:, lane] = v
-        return True
+        # Digits of stated rates: the joints come first.
+        rounded = (left > MET * pace) & ~stuck
+        if np.any(rounded):
+            v = np.where(rounded[:, None], nearest(constraints, v), v)
+        allowed = np.where(rounded, ROUNDING * pace, np.where(stuck, 0.0, np.inf))
+        kept = self._kept(firm, v, allowed)
+        self.v[:, lanes] = np.where(kept & ~stuck, v.T, self.v[:, lanes])
+        found[np.isin(every, lanes)] = kept
+        return found
 
-    def _kept(self, firm: list[_Wish], v: Array, allowed: float) -> bool:
-        """Return whether rates are the stated ones but for rounding.
+    def _kept(self, firm: list[_Wish], v: Array, allowed: Array) -> Flags:
+        """Return whether rates are the stated ones but for rounding, (lanes,).
 
         Raises InputError of a single scene if they are not.
         """
-        worst = max(firm, key=lambda one: one.off(v), default=None)
-        if worst is None or worst.off(v) <= allowed:
-            return True
-        if self.lanes > 1:
-            return False
-        assert worst.stated is not None
-        raise InputError(
-            f"{worst.stated.path}: contradicts the joints and the other rates, by {worst.off(v):.3g}; leave it out "
-            "and it follows from the rest"
-        )
+        kept = np.ones(len(v), dtype=bool)
+        for one in firm:
+            kept &= one.off(v) <= allowed
+        if self.lanes == 1 and not kept[0]:
+            worst = max(firm, key=lambda one: float(one.off(v)[0]))
+            assert worst.stated is not None
+            raise InputError(
+                f"{worst.stated.path}: contradicts the joints and the other rates, by {worst.off(v)[0]:.3g}; leave it "
+                "out and it follows from the rest"
+            )
+        return kept
 
-    def _mass(self, lane: int) -> Array:
+    def _mass(self, lanes: Index) -> Array:
+        """Return the mass matrices of some lanes, (lanes, unknowns, unknowns)."""
+        matrix = np.zeros((len(lanes), len(self.q), len(self.q)))
+        for (i, j), value in self._mass_entries.items():
+            numbers = np.ravel(value)
+            matrix[:, i, j] = matrix[:, j, i] = numbers[np.minimum(lanes, len(numbers) - 1)]
+        return matrix
+
+    @cached_property
+    def _mass_entries(self) -> Mapping[tuple[int, int], Number]:
         from shoal.mechanics.assembly.masses import Masses
         from shoal.mechanics.derived import RowAllocator
 
-        count = len(self.q)
-        matrix = np.zeros((count, count))
-        for (i, j), value in Masses(self.scene, self.placement, RowAllocator(count)).mass.items():
-            matrix[i, j] = matrix[j, i] = np.ravel(value)[min(lane, np.size(value) - 1)]
-        return matrix
+        return Masses(self.scene, self.placement, RowAllocator(len(self.q))).mass
 
 
-def _joined(wishes: list[_Wish]) -> _Wish:
-    """Return the equations of all."""
-    rows, values = zip(*((one.rows, one.values) for one in wishes), strict=True)
-    return _Wish(np.vstack(rows), np.concatenate(values))
+def _joined(wishes: list[_Wish], lanes: int) -> _Wish:
+    """Return the equations of all, of each lane."""
+    rows = [np.broadcast_to(one.rows, (lanes, *one.rows.shape[1:])) for one in wishes]
+    values = [np.broadcast_to(one.values, (lanes, one.values.shape[1])) for one in wishes]
+    return _Wish(np.concatenate(rows, axis=1), np.concatenate(values, axis=1))
