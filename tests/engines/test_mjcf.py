@@ -224,6 +224,9 @@ BASE: dict[str, Any] = {
         ({"loads": {"F": {"kind": "spring", "cubic": 2.0, **LOOP}}}, "loads.F.cubic: MJCF has linear springs only"),
         ({"loads": {"F": {"kind": "torsion-spring", "stiffness": 2.0, **LOOP}}},
          "loads.F: MJCF has torsion springs in revolute joints only, about their axis"),
+        ({"joints": {"P": {"first": end("A"), "second": {"body": "B"}, "stops": {"max": 3.0}}}},
+         "joints.P.stops: not written as MJCF"),
+        ({"joints": {"D": {"kind": "distance", "keeps": "at-most", **LOOP}}}, "joints.D.keeps: not written as MJCF"),
         ({"ground_points": {"P": {"x": "t"}}}, "ground_points.P: MJCF has no functions of time"),
     ],
 )  # fmt: skip

@@ -302,3 +302,22 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     refused = CliRunner().invoke(main, ["export-fmu", "single-pendulum", "--parameter", "mass"])
     assert refused.exit_code == 2
     assert len(refused.stderr.splitlines()) == 1
+
+
+@pytest.mark.compiles("kernels of contacts, which few machines need")
+def test_a_unit_with_a_stop_strikes_it_as_simulate_does(tmp_path: Path) -> None:
+    """Its motion is that of the events, whatever the communication step, and its energy falls at each impact."""
+    pendulum = load_scene("single-pendulum")
+    data = pendulum.model_dump(mode="json", exclude_unset=True)
+    (joint,) = data["joints"].values()
+    joint["stops"] = {"min": -np.pi / 2 - 0.2, "restitution": 0.5}
+    scene = Scene.parse(data)
+    found = run(export(scene, out=tmp_path / "stop.fmu"), 2.0, 0.02)
+    right = get_engine("gauss").simulate(scene, found["time"])
+    (marker, *_) = scene.markers
+    assert found[f"{marker}.x"] == pytest.approx(right.marker(marker)[:, 0], abs=1e-12)
+    impacts = [event["time"] for event in right.model["events"] if event["kind"] == "impact"]
+    assert len(impacts) > 1
+    before, after = (found["energy"][np.searchsorted(found["time"], impacts[0]) + k] for k in (-1, 0))
+    assert after < before - 1e-3
+    assert np.ptp(found["energy"][found["time"] < impacts[0]]) < 1e-8

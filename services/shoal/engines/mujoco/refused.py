@@ -44,6 +44,10 @@ def require_counterparts(scene: Scene) -> None:
             raise InputError(f"joints.{name}.mu: MJCF has no friction by the force of a joint")
         if isinstance(joint, Revolute | Slider) and joint.drag:
             raise InputError(f"joints.{name}.drag: MJCF has no quadratic drag of a joint")
+        if isinstance(joint, Revolute | Slider) and joint.stops is not None:
+            raise InputError(f"joints.{name}.stops: not written as MJCF; there its limits would give way")
+        if isinstance(joint, Distance) and joint.keeps != "exactly":
+            raise InputError(f"joints.{name}.keeps: not written as MJCF; there a limit of a length would give way")
         if isinstance(joint, Distance) and joint.length is not None and joint.length.number is None:
             raise InputError(f"joints.{name}.length: MJCF has no functions of time")
     for name, load in scene.loads.items():
