@@ -106,6 +106,7 @@ class Runs:
         limits, floor = self._limits, self._limits.energy_floor(end)
         left: list[tuple[Array, Array, Array]] = []
         happened: list[dict[str, Any]] = []
+        closed: list[str] = []
         states = States.room(moved, len(times)) if whole else None
         stop = Event() if workers > 1 else None
 
@@ -123,6 +124,7 @@ class Runs:
             if single:
                 left.append(space.left)
                 happened.extend(space.events)
+                closed.extend(space.closed)
             if single not in self._found:
                 self._found[single] = pickle.dumps(self._facts(record.begin if single else None))
             if seek is None and self._alike and space.size <= LARGEST:
@@ -149,7 +151,7 @@ class Runs:
         facts = pickle.loads(self._found[single])
         facts["evaluations"] = int(largest[EVALUATIONS])
         if self.model.gaps.size and single:
-            facts["events"] = happened
+            facts["events"], facts["closed_contacts"] = happened, closed
         if largest[CLOSENESS] > 0.0:
             facts["distance_from_singular"] = float(largest[CLOSENESS] ** -0.5)
         ended = Ended(moved, end, *left[0], motion[-1, :, d, 0].copy()) if left and not any(findings) else None

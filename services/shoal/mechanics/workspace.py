@@ -131,6 +131,13 @@ class Workspace:
         return recorded(log, names, gaps.closed if whole else np.zeros_like(gaps.closed))
 
     @property
+    def closed(self) -> list[str]:
+        """Joints whose contacts are closed at the end of a march of one lane."""
+        closed = self.march.frame.room.gaps.closed
+        names = (field.split(".")[1] for field in self._model.gap_fields)
+        return list(dict.fromkeys(name for name, one in zip(names, closed, strict=True) if one != 0.0))
+
+    @property
     def left(self) -> tuple[Array, Array, Array]:
         """Coordinates and rates at the last sampling time, and the turns of angle forces, of a march of one lane."""
         frame, n = self.march.frame, self._model.unknowns

@@ -70,8 +70,15 @@ def _stage(found: DrawnMotion, title: str) -> tuple[Figure, list[tuple[Any, Any]
         shown.append((drawn, path))
 
     axes.plot(*found.ground.T, "s", color=GREY, markersize=8)
-    for thin in (*found.thin.values(), *found.links.values()):
+    for thin in found.thin.values():
         line(thin, "-", "", color=GREY, linewidth=0.8)
+    for name, ends in found.links.items():
+        loose = found.slack.get(name, np.zeros(len(ends), dtype=bool))[:, None, None]
+        line(np.where(loose, np.nan, ends), "-", "", color=GREY, linewidth=0.8)
+        if np.any(loose):
+            line(np.where(loose, ends, np.nan), "--", "", color=GREY, linewidth=0.8)
+    for stop in found.stops.values():
+        line(stop, "-", "", color=BLACK, linewidth=1.0)
     for outline in found.outlines.values():
         line(outline, "o-", "", color=BLUE, linewidth=3, markersize=4, markevery=[0, -1])
     for number, path in enumerate(found.markers.values()):

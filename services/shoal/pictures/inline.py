@@ -150,6 +150,7 @@ def _html(
 
 def _paths(trajectory: Trajectory) -> Figure:
     markers = {name: trajectory.marker(name) for name in trajectory.markers}
-    moving = DrawnMotion("", trajectory.times, np.empty((0, len(trajectory.axes))), {}, markers)
+    events = trajectory.model.get("events", ())
+    moving = DrawnMotion("", trajectory.times, np.empty((0, len(trajectory.axes))), {}, markers, events=events)
     name = trajectory.engine
     return paths(moving, reaches(name, moving, trajectory.errors) if trajectory.ok else rejected(name, trajectory))

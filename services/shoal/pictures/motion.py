@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +11,7 @@ import numpy as np
 from shoal.engines.contract import Engine
 from shoal.errors import ComputationError, InputError
 from shoal.json_values import plain
+from shoal.pictures.contacts import Stops, slack, struck
 from shoal.pictures.links import At, Links
 from shoal.pictures.outline import ground, outlined
 from shoal.pictures.solids import Bar, MarkedScene
@@ -32,7 +33,9 @@ class DrawnMotion:
     outlines: points of each body [m], (frames, points, d); markers: of the model [m], (frames, d)
     measured: places [m], (frames, d), nan where none was measured near that time; directions: measured angles [rad]
     behind: outlines of another machine that is drawn below [m], (frames, points, d)
-    links: places that a spring or a distance joins [m], (frames, 2, d)
+    links: places that a spring or a distance joins [m], (frames, 2, d); slack: when ropes and struts hold nothing,
+    (frames,); stops: lines of limits at their joints in the plane [m], (frames, points, 2), nan between them
+    events: of contacts, as `model["events"]` has them; struck: times of impacts, by marker [s]
     In space: bars of bodies; axes of joints: a point [m] and a direction, (frames, 2, 3); up: the direction against
     gravity, along an axis, (3,).
     Of a view on paper: thin lines [m], (frames, points, 2), nan between them; labels of the coordinates.
@@ -47,6 +50,10 @@ class DrawnMotion:
     directions: dict[str, Array] = field(default_factory=dict)
     behind: dict[str, Array] = field(default_factory=dict)
     links: dict[str, Array] = field(default_factory=dict)
+    slack: dict[str, Array] = field(default_factory=dict)
+    stops: dict[str, Array] = field(default_factory=dict)
+    events: Sequence[Mapping[str, Any]] = ()
+    struck: dict[str, Array] = field(default_factory=dict)
     bars: dict[str, Bar] = field(default_factory=dict)
     axes: dict[str, Array] = field(default_factory=dict)
     up: Array | None = None
@@ -61,7 +68,7 @@ class DrawnMotion:
     @property
     def box(self) -> tuple[Array, Array]:
         """Lower left and upper right corner [m] of all that is shown, (2,) each."""
-        parts = (self.outlines, self.behind, self.measured, self.links, self.thin)
+        parts = (self.outlines, self.behind, self.measured, self.links, self.stops, self.thin)
         moving = (path for part in parts for path in part.values())
         solid = (bar.edges for bar in self.bars.values())
         every = np.concatenate([np.reshape(x, (-1, self.ground.shape[1])) for x in (*moving, *solid, self.ground)])
@@ -119,7 +126,9 @@ def scene_motion(scene: Scene, engine: Engine, until: float, frames: int = _FRAM
         raise ComputationError(f"{scene.name}: there is no motion to show: {seen.explanation or seen.status[0]}")
     markers = {name: seen.marker(name)[:count] for name in scene.markers}
     shown = read(lambda name: seen.marker(name)[:count], seen.times[:count])
-    return DrawnMotion(scene.name, seen.times[:count], ground(scene), markers=markers, **shown)
+    events = seen.model.get("events", ())
+    happened = {"events": events, "struck": struck(scene, events)}
+    return DrawnMotion(scene.name, seen.times[:count], ground(scene), markers=markers, **happened, **shown)
 
 
 def traced_out(scene: Scene) -> tuple[Scene, Callable[[At, Array], dict[str, Any]]]:
@@ -128,14 +137,16 @@ def traced_out(scene: Scene) -> tuple[Scene, Callable[[At, Array], dict[str, Any
     These are the paths of a marker by its name [m], (frames, d), and the times of the motion [s], (frames,).
     """
     traced, points = outlined(scene)
-    links = Links(scene)
+    links, stops = Links(scene), Stops(scene)
     solids = MarkedScene(traced, points, scene) if scene.dimensions == 3 else None
     data = (traced if solids is None else solids.scene).model_dump(mode="json")
-    data["markers"] |= links.markers
+    data["markers"] |= links.markers | stops.markers
 
     def read(at: At, times: Array) -> dict[str, Any]:
         outlines = {body: np.stack([at(name) for name in names], axis=1) for body, names in points.items()}
-        shown = {"outlines": outlines, "links": links.shown(at, times)}
+        joined = links.shown(at, times)
+        limits = {"slack": slack(scene, joined), "stops": stops.shown(at, len(times))}
+        shown = {"outlines": outlines, "links": joined, **limits}
         return shown if solids is None else {**shown, "up": upwards(scene), **solids.shown(at, len(times))}
 
     return Scene.parse(data, scene.name), read
@@ -203,6 +214,8 @@ def plain_motion(found: DrawnMotion) -> dict[str, Any]:
         "behind": {name: plain(np.round(x, digits)) for name, x in found.behind.items()},
         "outlines": {name: plain(np.round(x, digits)) for name, x in found.outlines.items()},
         "links": {name: plain(np.round(x, digits)) for name, x in found.links.items()},
+        "slack": {name: x.tolist() for name, x in found.slack.items()},
+        "stops": {name: plain(np.round(x, digits)) for name, x in found.stops.items()},
         "markers": {name: plain(np.round(x, digits)) for name, x in found.markers.items()},
         "measured": {name: plain(np.round(x, digits)) for name, x in found.measured.items()},
         "directions": {name: plain(np.round(x, 4)) for name, x in found.directions.items()},

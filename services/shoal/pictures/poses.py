@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
+from shoal.pictures.contacts import mark_impacts
 from shoal.pictures.motion import DrawnMotion
 from shoal.pictures.style import BLACK, BLUE, GREY, ORANGE, VERMILION, canvas, headline, styled
 from shoal.pictures.views import views
@@ -60,8 +61,13 @@ def _draw(axes: Axes, found: DrawnMotion, way: str) -> None:
     chosen = np.linspace(0, len(found.times) - 1, count).round().astype(int)
     for number, k in enumerate(chosen):
         strength = min(1.0, 0.2 + 0.8 * number / max(count - 1, 1))
-        for line in (*found.thin.values(), *found.links.values()):
+        for line in found.thin.values():
             axes.plot(*line[k].T, color=GREY, alpha=strength, linewidth=0.7)
+        for name, line in found.links.items():
+            style = "--" if name in found.slack and found.slack[name][k] else "-"
+            axes.plot(*line[k].T, style, color=GREY, alpha=strength, linewidth=0.7)
+        for stop in found.stops.values():
+            axes.plot(*stop[k].T, color=BLACK, alpha=strength, linewidth=1.0)
         for outline in found.outlines.values():
             axes.plot(*outline[k].T, "o-", markersize=2.5, markevery=[0, -1], color=BLUE, alpha=strength, linewidth=2.2)
     size = 7 if len(found.ground) <= _FEW else 3
@@ -70,6 +76,10 @@ def _draw(axes: Axes, found: DrawnMotion, way: str) -> None:
         axes.plot(*place.T, "o", color=BLACK, markersize=4, fillstyle="none", label="" if number else "measured")
     for number, path in enumerate(found.markers.values()):
         axes.plot(*path.T, color=VERMILION, linewidth=1.2, label="" if number else way)
+    hit = [name for name, hits in found.struck.items() if len(hits)]
+    for name in hit:
+        label = "impact" if name == hit[0] else ""
+        mark_impacts(axes, found.times, found.markers[name], found.struck[name], label)
     _names(axes, found)
     _directions(axes, found, chosen)
     axes.set_xlabel(found.labels[0])

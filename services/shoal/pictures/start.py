@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from shoal.pictures.event_text import told
+
 if TYPE_CHECKING:
     from shoal.engines.sweep import Sweep
 
@@ -16,7 +18,7 @@ REASONS = 4
 
 
 def remarks(model: Mapping[str, Any], ok: bool = True) -> list[str]:
-    """Return sentences on stated values that were changed, redundant joints, and drives whose rate jumps.
+    """Return sentences on changed values, redundant joints, drives whose rate jumps, and events of contacts.
 
     ok: whether the run is believed.
     """
@@ -28,7 +30,7 @@ def remarks(model: Mapping[str, Any], ok: bool = True) -> list[str]:
     if joints := model.get("redundant_joints"):
         unique = "; the motion is unique, their forces are the least ones" if ok else ""
         found.append(f"redundant joints: {', '.join(joints)}{unique}")
-    return found + list(model.get("held_drives", ()))
+    return [*found, *model.get("held_drives", ()), *told(model)]
 
 
 def reasons(sweep: Sweep) -> list[str]:

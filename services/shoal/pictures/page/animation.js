@@ -36,12 +36,23 @@ function animate(figure) {
     return { size, to: (p) => [x0 + size * (p[0] - left), height - y0 - size * (p[1] - bottom)] };
   }
 
-  function line(points, colour, thickness) {
+  function line(points, colour, thickness, dashes = []) {
     context.strokeStyle = colour;
     context.lineWidth = thickness;
+    context.setLineDash(dashes);
     context.beginPath();
     points.forEach((p, k) => (k ? context.lineTo(...p) : context.moveTo(...p)));
     context.stroke();
+    context.setLineDash([]);
+  }
+
+  function lines(points, to, colour, thickness) {
+    // Places that are null are between lines.
+    let part = [];
+    for (const p of [...points, [null, null]]) {
+      if (p[0] !== null) part.push(to(p));
+      else if (part.length) { line(part, colour, thickness); part = []; }
+    }
   }
 
   function circle(p, radius, colour, filled) {
@@ -81,7 +92,10 @@ function animate(figure) {
     }
     for (const path of Object.values(run.markers)) line(path.slice(0, frame + 1).map(to), "#F0B48C", 1.5);
     for (const outline of Object.values(run.behind)) line(outline[frame].map(to), "#A0A0A0", 3);
-    for (const ends of Object.values(run.links)) line(ends[frame].map(to), GREY, 1.5);
+    for (const [name, ends] of Object.entries(run.links)) {
+      line(ends[frame].map(to), GREY, 1.5, run.slack[name]?.[frame] ? [5, 5] : []);
+    }
+    for (const stop of Object.values(run.stops)) lines(stop[frame], to, BLACK, 1.5);
     for (const outline of Object.values(run.outlines)) {
       line(outline[frame].map(to), BLUE, 4);
       for (const end of [outline[frame][0], outline[frame].at(-1)]) circle(to(end), 4, BLUE, true);

@@ -161,7 +161,9 @@ function spatial(run, figure, redraw) {
     for (const outline of Object.values(run.behind)) {
       for (let k = 0; k + 1 < outline[frame].length; k += 1) line(outline[frame].slice(k, k + 2), "#A0A0A0", 3);
     }
-    for (const ends of Object.values(run.links)) line(ends[frame], "#767676", 1.5);
+    for (const [name, ends] of Object.entries(run.links)) {
+      line(ends[frame], "#767676", 1.5, run.slack[name]?.[frame] ? [5, 5] : []);
+    }
     for (const axis of Object.values(run.axes)) {
       const [place, way] = axis[frame];
       for (const half of [-1, 1]) line([place, add(place, way, 0.1 * half * extent)], "#B06A00", 1.6, [9, 3, 2, 3]);

@@ -1,0 +1,100 @@
+"""Contacts in pictures: events on the axis of time, impacts on paths, stops, slack ropes, and words about them."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import numpy as np
+import pytest
+from shoal.engines import get_engine
+from shoal.pictures.event_text import told
+from shoal.pictures.gif import gif
+from shoal.pictures.motion import scene_motion
+from shoal.pictures.paths import paths
+from shoal.pictures.poses import poses
+from shoal.pictures.simulation import simulation
+from shoal.scene import Scene
+
+SWUNG = {
+    "name": "swung", "gravity": [0.0, -9.81],
+    "bodies": {
+        "m": {"kind": "point-mass", "mass": 1.0},
+        "arm": {"kind": "rigid-body", "mass": 1.0, "inertia": 0.0833, "centre_of_mass": [0.5, 0.0],
+                "named_points": {"end": [1.0, 0.0]}},
+        "fore": {"kind": "rigid-body", "mass": 0.5, "inertia": 0.02, "centre_of_mass": [0.3, 0.0],
+                 "named_points": {"end": [0.6, 0.0]}},
+    },
+    "joints": {
+        "rope": {"kind": "distance", "keeps": "at-most", "first": {"body": "ground", "point": [0.0, 0.0]},
+                 "second": {"body": "m"}},
+        "shoulder": {"first": {"body": "ground", "point": [1.8, 0.5]}, "second": {"body": "arm"},
+                     "stops": {"min": -2.2, "restitution": 0.6}},
+        "elbow": {"first": {"body": "arm", "point": "end"}, "second": {"body": "fore"},
+                  "stops": {"min": -0.3, "max": 1.2, "restitution": 0.4}},
+    },
+    "markers": {"P": {"body": "m"}, "E": {"body": "arm", "point": "end"}, "F": {"body": "fore", "point": "end"}},
+    "initial": {"m": {"position": [0.0, -1.0], "velocity": [5.86, 0.0]}, "arm": {"angle": -0.9, "rate": 0.0},
+                "fore": {"angle": -0.5, "rate": 0.0}},
+    "solver": {"duration": 2.0},
+}  # fmt: skip
+"""A mass on a rope that flies and is caught, beside an arm between stops."""
+
+
+@pytest.mark.compiles("kernels of contacts, which few machines need")
+def test_events_are_marked_on_the_axis_of_time_and_on_the_paths_that_they_bend() -> None:
+    moving = scene_motion(Scene.parse(SWUNG), get_engine("gauss"), 2.0)
+    kinds = {(event["joint"], event["kind"]) for event in moving.events}
+    assert {("rope", "opens"), ("rope", "impact"), ("elbow", "impact")} <= kinds
+    # The mass on the rope and the arm are machines of their own.
+    impacts = {joint: [e["time"] for e in moving.events if e["joint"] == joint and e.get("impulse", 0.0) > 0.0]
+               for joint in ("rope", "shoulder", "elbow")}  # fmt: skip
+    assert moving.struck["P"].tolist() == impacts["rope"]
+    assert sorted(moving.struck["E"].tolist()) == sorted(impacts["shoulder"] + impacts["elbow"])
+    figure = paths(moving, "title")
+    (legend,) = figure.legends
+    said = [text.get_text() for text in legend.get_texts()]
+    count = sum(map(len, impacts.values()))
+    assert sorted(said) == ["E", "F", "P", f"impact ({count})", "opens (1)"]
+    assert "impact" in [text.get_text() for text in poses(moving, "title").legends[0].get_texts()]
+
+
+def test_stops_are_drawn_where_the_second_body_stands_at_its_limit() -> None:
+    moving = scene_motion(Scene.parse(SWUNG), get_engine("gauss"), 2.0, frames=801)
+    hits = [event["time"] for event in moving.events if event["joint"] == "elbow" and event.get("impulse", 0.0) > 0.0]
+    frame = int(np.argmin(np.abs(moving.times - hits[0])))
+    elbow, tip = moving.outlines["fore"][frame]
+    way = (tip - elbow) / np.linalg.norm(tip - elbow)
+    drawn = moving.stops["elbow"][frame] - elbow
+    drawn = drawn[np.isfinite(drawn[:, 0])]
+    ends = drawn / np.linalg.norm(drawn, axis=1, keepdims=True)
+    assert np.min(np.linalg.norm(ends[-4:] - way, axis=1)) < 0.05
+    # The arm's own stop stands still.
+    assert np.ptp(moving.stops["shoulder"], axis=0)[0].max() == 0.0
+
+
+def test_a_slack_rope_is_told_from_a_taut_one() -> None:
+    moving = scene_motion(Scene.parse(SWUNG), get_engine("gauss"), 2.0)
+    times = {event["kind"]: event["time"] for event in moving.events if event["joint"] == "rope"}
+    opens, caught = times["opens"], times["impact"]
+    loose = moving.times[moving.slack["rope"]]
+    assert opens < loose.min() < opens + 0.1
+    assert caught - 0.05 < loose.max() < caught
+    assert gif(moving, "title").startswith(b"GIF")
+
+
+def test_the_page_and_the_terminal_say_what_happened() -> None:
+    scene = Scene.parse(SWUNG)
+    run = get_engine("gauss").simulate(scene)
+    (said,) = told(run.model)
+    count = sum(event.get("impulse", 0.0) > 0.0 for event in run.model["events"])
+    last = run.model["events"][-1]
+    assert said.startswith(f"{count} impacts, the last event: {last['joint']} {last['kind']} at ")
+    assert said.endswith("in contact at the end: rope")
+    assert not list(told({"events": []}))
+    page = simulation(run, scene)
+    assert said in page
+    shown = json.loads(re.search(r"<script type=.application/json.[^>]*>(.*?)</script>", page, re.DOTALL)[1])  # type: ignore[index]
+    assert {*shown["stops"]} == {"shoulder", "elbow"}
+    assert any(shown["slack"]["rope"])
+    assert not all(shown["slack"]["rope"])
