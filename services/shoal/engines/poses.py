@@ -97,6 +97,7 @@ def _check_speeds(scene: Scene, poses: dict[str, InitialPose]) -> None:
     v = np.concatenate([[*poses[name].velocity, poses[name].rate] for name in scene.bodies])
     rows = Closure(scene, u).rows(u)
     slip = np.abs(rows.along(v[None])[0] + rows.rate[0])
+    fastest = SLIP * max(1.0, span(scene))
     for name, speed in zip(rows.names, slip, strict=True):
-        if speed > SLIP * max(1.0, span(scene)):
+        if speed > fastest:
             raise InputError(f"joints.{name}: its places start at {speed:.3g} m/s apart; change a rate under initial")

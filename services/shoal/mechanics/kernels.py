@@ -76,7 +76,7 @@ def settle(
 ) -> None:
     """Remove the drift of a constrained model (nothing to do where sharing expressed every joint).
 
-    found: whether the accelerations of this very state are the last that were found
+    found: whether the last accelerations that were found are of this state, or as near as those of a stage at its time
     """
     if m.constraints.size > 0 and m.projects:
         t = instant(w, t)

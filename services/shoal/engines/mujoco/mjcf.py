@@ -56,6 +56,7 @@ class Mjcf:
         check_acceleration(scene)
         require_counterparts(scene)
         self.scene = scene
+        self._size = span(scene)
         self._begin, self._axis, self.initial = started(scene)
         self.soft: list[str] = []
         self.rates: list[float] = []
@@ -113,7 +114,7 @@ class Mjcf:
 
     def _inertia(self, element: ElementTree.Element, name: str) -> None:
         body = self.scene.bodies[name]
-        least = max(THINNEST * body.mass * span(self.scene) ** 2, LEAST)
+        least = max(THINNEST * body.mass * self._size**2, LEAST)
         centre, turn = (0.0, 0.0, 0.0), Rotation.identity()
         if isinstance(body, PointMass):
             moments = np.full(3, least)
@@ -177,14 +178,14 @@ class Mjcf:
                 size = [body.length / 2, section.height / 2, section.width / 2]
                 _under(element, "geom", type="box", pos=middle, size=_numbers(size), **seen)
             return
-        thick = repr(0.01 * span(self.scene))
+        thick = repr(0.01 * self._size)
         if isinstance(body, PointMass):
             _under(element, "geom", type="sphere", size=thick, **seen)
             return
         centre = np.array(padded(body.centre_of_mass, 3), dtype=float)
         places = [local(self.scene, at) for at in self._attached(name)]
         for place in {tuple(place): place for place in places}.values():
-            if np.linalg.norm(place - centre) > 1e-9 * span(self.scene):
+            if np.linalg.norm(place - centre) > 1e-9 * self._size:
                 ends = _numbers([*centre, *place])
                 _under(element, "geom", type="capsule", fromto=ends, size=thick, **seen)
 
@@ -231,7 +232,7 @@ class Mjcf:
             place = where(self.scene, self._begin, joint.first)
             places = [place]
             if isinstance(joint, Revolute) and self.scene.dimensions == 3 and not masses:
-                places.append(place + 0.2 * span(self.scene) * self._axis(joint.first, joint.axis))
+                places.append(place + 0.2 * self._size * self._axis(joint.first, joint.axis))
             for number, one in enumerate(places):
                 anchor = _numbers(self._begin[joint.first.body].back(one))
                 own = name if number == 0 else f"{name}-{number + 1}"

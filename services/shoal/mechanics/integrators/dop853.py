@@ -143,7 +143,7 @@ def step(tile: Tile, scheme: Dop853, m: Arrays, w: Work, t: float, h: float) -> 
                 return rest
             h = control.first_trial(c, rest)
     control.accept(c, error, h, ORDER_OF_ERROR, rejected)
-    kernels.settle(tile, m, w, t + h, room.rank_tolerance)
+    kernels.settle(tile, m, w, t + h, room.rank_tolerance, found=True)
     kernels.acceleration(tile, m, w, t + h, w.z, w.zdot, room.rank_tolerance, w.a)
     room.evaluations[0] += 1
     return h

@@ -63,7 +63,7 @@ def step(tile: Tile, scheme: Rk4, m: Arrays, w: Work, t: float, h: float) -> flo
     for i in range(end):
         w.z[i] = w.stage[i] + h / 6.0 * w.stage[q_sum + i]
         w.zdot[i] = w.stage[v + i] + h / 6.0 * w.stage[v_sum + i]
-    kernels.settle(tile, m, w, t + h, scheme.rank_tolerance)
+    kernels.settle(tile, m, w, t + h, scheme.rank_tolerance, found=True)
     kernels.acceleration(tile, m, w, t + h, w.z, w.zdot, scheme.rank_tolerance, w.a)
     return h
 

@@ -1,7 +1,8 @@
 """The removal of drift: the smallest change in the metric of the mass matrix that closes the constraints again.
 
-Drift is small, and so is the way back. By the sparse saddle point problem the factors of its beginning serve for all of
-it, places and rates, and are renewed only where a change has left more than a hundredth of a gap.
+Drift is small, and so is the way back. By the sparse saddle point problem the factors of the last accelerations serve
+for all of it, places and rates (chord method), and are renewed only where a change has left more than a hundredth of a
+gap.
 """
 
 from __future__ import annotations
@@ -43,10 +44,11 @@ def project(
 ) -> None:
     """Move q and v back onto C = 0 and C_q v = -C_t by the smallest change in the mass metric.
 
-    ready: whether the accelerations at q have just been found by the projection, whose directions are at hand.
+    ready: whether accelerations have just been found at q or near it by the projection, whose directions are at hand.
     Where no position closes the constraints, as no drive beyond the reach of the joints does, the motion ends.
     """
-    factored, now = _close(tile, m, w, t, q, tolerance, iterations, ready and w.saddle.weak[0] == 0.0)
+    ready = ready and w.saddle.weak[0] == 0.0 and w.saddle.opened[0] == 0.0
+    factored, now = _close(tile, m, w, t, q, tolerance, iterations, ready)
     if now > SMALL and factored and m.saddle.rows < m.constraints.size:
         w.saddle.opened[0] = 1.0
         factored, now = _close(tile, m, w, t, q, tolerance, iterations, False)
@@ -109,13 +111,17 @@ def _project_rates(
     """The same; ready: whether there are factors of a place near q. Again with those, as a change leaves a little."""
     derive(tile, m.derived, q, m.unknowns, m.held_rows, False)
     constraints.jacobian(tile, m.constraints, q, 1.0, w.jacobian)
-    factored = ready or _prepare(tile, m, w)
+    factored, before = ready or _prepare(tile, m, w), np.inf
     for again in range(3 if ready else 1):
         constraints.rates(tile, m.constraints, m.functions, t, w.gap)
         constraints.add_product(tile, m.constraints, w.jacobian, v, w.gap)
-        if again and _largest(tile, m, w) < LITTLE:
+        now = _largest(tile, m, w)
+        if again and now < LITTLE:
             break
+        if not (now < SLOW * before or now < SMALL):
+            factored = _prepare(tile, m, w)
         _correct(tile, m, w, v, tolerance, factored)
+        before = now
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
