@@ -19,13 +19,13 @@ def _factor(pattern, values):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _solve(tile, space, shared, w, x):  # type: ignore[no-untyped-def]
-    alike.solve(tile, space, raw(shared), pointer(w), pointer(x))
+def _solve(tile, shared, w, x):  # type: ignore[no-untyped-def]
+    alike.solve(tile, raw(shared), pointer(w), pointer(x))
 
 
 @njit(cache=True)
-def _multiply(tile, space, shared, x, y):  # type: ignore[no-untyped-def]
-    alike.multiply(tile, space, raw(shared), pointer(x), pointer(y))
+def _multiply(tile, shared, x, y):  # type: ignore[no-untyped-def]
+    alike.multiply(tile, raw(shared), pointer(x), pointer(y))
 
 
 def _chain(size: int) -> Any:
@@ -59,11 +59,10 @@ def test_solution_and_product_equal_numpy(size: int, components: int, tile: Tile
     shared, whole = _shared(matrix, components), np.kron(matrix, np.eye(components))
     right = np.random.default_rng(1).normal(size=(len(whole), len(tile)))
     x, room, product = right.flatten(), np.full(4 * alike.FEW + 1, np.pi), np.empty(right.size)
-    space = (0,) * max(components, 2)
-    _solve(tile, space, shared, room, x)
+    _solve(tile, shared, room, x)
     np.testing.assert_allclose(x.reshape(right.shape), np.linalg.solve(whole, right), rtol=1e-12, atol=1e-14)
     assert room[-1] == np.pi
-    _multiply(tile, space, shared, right.flatten(), product)
+    _multiply(tile, shared, right.flatten(), product)
     np.testing.assert_allclose(product.reshape(right.shape), whole @ right, rtol=1e-12, atol=1e-13)
 
 

@@ -29,7 +29,7 @@ def _force(tile, held, packed, t, z, zdot, f, power):
 def loads(coefficient: Array, factor: Array) -> Applied:
     """Fixed loads on rows 0, 1 and 1; loads at (0, 1) and (2, 3) that turn with (2, 3) and (4, 5)."""
     return Applied(
-        (0, 0), 3, np.array([0, 1, 1]), np.ravel(coefficient), np.array([-1, 0, 1]),
+        2, 3, np.array([0, 1, 1]), np.ravel(coefficient), np.array([-1, 0, 1]),
         2, np.array([0, 1, 2, 3, 2, 3, 4, 5]), np.ravel(factor), np.array([1, -1]),
         0, NONE, NONE, 0, NONE, NONE,
     )  # fmt: skip
@@ -73,7 +73,7 @@ def test_nothing_from_no_loads() -> None:
     none = np.zeros(0)
     found, power = force(
         SINGLE,
-        Applied((0, 0), 0, NONE, none, NONE, 0, NONE, none, NONE, 0, NONE, NONE, 0, NONE, NONE),
+        Applied(2, 0, NONE, none, NONE, 0, NONE, none, NONE, 0, NONE, NONE, 0, NONE, NONE),
         np.ones((6, 1)),
         np.ones((6, 1)),
     )
@@ -89,7 +89,7 @@ def test_a_torque_on_a_section_works_in_its_turn_alone() -> None:
     director = np.cross(slope, n) / np.linalg.norm(np.cross(slope, n))
     z = np.concatenate([n, slope, director])
     held = Applied(
-        (0, 0, 0), 0, NONE, np.zeros(0), NONE, 0, NONE, np.zeros(0), NONE, 0, NONE, NONE,
+        3, 0, NONE, np.zeros(0), NONE, 0, NONE, np.zeros(0), NONE, 0, NONE, NONE,
         1, np.arange(9), np.array([0]),
     )  # fmt: skip
     rates = np.concatenate([np.zeros(3), np.cross(turn, slope) + 0.3 * slope, np.cross(turn, director)])

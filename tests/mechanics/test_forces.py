@@ -99,7 +99,7 @@ def bench(
         rows = np.arange(6 * size)
     table, energy, drive = (np.full(size, number) for number in numbers)
     laws = np.tile(np.broadcast_to(np.reshape(law, (LAW, -1)), (LAW, width)), (size, 1))
-    held = Forces((0, 0), size, np.array(kinds), np.array(rows).ravel(), table, energy, drive, laws.ravel())
+    held = Forces(2, size, np.array(kinds), np.array(rows).ravel(), table, energy, drive, laws.ravel())
     return Bench(tile, held, np.zeros(size * width))
 
 

@@ -23,7 +23,7 @@ from numba.extending import _Intrinsic
 from shoal.compile.choice import ALTERNATIVES
 
 _OWN = "shoal."
-_INSTRUCTIONS = ("choice", "function_pointers", "linking", "pointers", "simd", "structures", "vector")
+_INSTRUCTIONS = ("choice", "function_pointers", "linking", "pointers", "simd", "structures", "tuples", "vector")
 """Modules whose functions run while a kernel is compiled and decide its code: they count as a whole."""
 
 

@@ -21,7 +21,7 @@ from typing import Any
 from numba.core import caching, config, dispatcher, event
 from numba.core.compiler_lock import global_compiler_lock
 
-from shoal.compile import clock, content, linking, operators
+from shoal.compile import analysis, clock, content, linking, operators
 from shoal.compile.progress import report
 from shoal.errors import FULL, ComputationError
 
@@ -34,6 +34,7 @@ _SECONDS = {
     "motion": 4.0,
     "constrain": 3.0,
     "stiffness": 3.0,
+    "assemble": 4.0,
     "force": 3.0,
     "settle": 2.0,
     "step": 2.0,
@@ -174,9 +175,10 @@ def _save(self: Any, sig: Any, data: Any) -> None:
 
 @cache
 def install() -> None:
-    """Install: from now on compile under locks, with `linking` and `operators`, and report (`progress`)."""
+    """Install: from now on compile under locks, with `linking`, `operators` and `analysis`, and report (`progress`)."""
     linking.install()
     operators.install()
+    analysis.install()
     dispatcher.Dispatcher.compile = _compile  # type: ignore[method-assign]
     caching.Cache.save_overload = _save
     event.register("numba:compile", _Listener())

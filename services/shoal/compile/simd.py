@@ -25,7 +25,8 @@ from shoal.compile.pointers import Pointer
 
 EIGHT: tuple[int, ...] = (0,) * 8
 """The lanes of the longest vectors of today's processors."""
-_FLAGS = ("contract", "nsz")
+FLAGS = ("contract", "nsz")
+"""What the compiler may do with operations on vectors: fuse products and sums, and forget signs of zeros."""
 
 
 class Vector(types.Type):  # type: ignore[misc]
@@ -50,7 +51,8 @@ def _place(builder: Any, base: Any, at: Any, count: int) -> Any:
     return builder.bitcast(builder.gep(base, [at]), _vector(count).as_pointer())
 
 
-def _spread(builder: Any, value: Any, count: int) -> Any:
+def spread_value(builder: Any, value: Any, count: int) -> Any:
+    """Append instructions that broadcast a number to a vector."""
     kind = ir.VectorType(value.type, count)
     undefined = ir.Constant(kind, ir.Undefined)
     first = builder.insert_element(undefined, value, ir.Constant(ir.IntType(32), 0))
@@ -85,7 +87,7 @@ def add_to(typing_context, base, at, value):  # type: ignore[no-untyped-def]
 
     def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
         place = _place(builder, arguments[0], arguments[1], value.count)
-        builder.store(builder.fadd(builder.load(place, align=8), arguments[2], flags=_FLAGS), place, align=8)
+        builder.store(builder.fadd(builder.load(place, align=8), arguments[2], flags=FLAGS), place, align=8)
         return context.get_dummy_value()
 
     return types.void(base, at, value), generate
@@ -98,7 +100,7 @@ def gather(typing_context, tile, base, first, step):  # type: ignore[no-untyped-
 
     def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
         _, base, at, step = arguments
-        return _collected(builder, [builder.add(at, builder.mul(step, at.type(k))) for k in range(count)], base)
+        return _collected(builder, _stepped(builder, at, step, count), base)
 
     return Vector(count)(tile, base, first, step), generate
 
@@ -110,7 +112,7 @@ def pick(typing_context, tile, base, rows, first, step):  # type: ignore[no-unty
 
     def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
         _, base, rows, at, step = arguments
-        places = [builder.gep(rows, [builder.add(at, builder.mul(step, at.type(k)))]) for k in range(count)]
+        places = [builder.gep(rows, [place]) for place in _stepped(builder, at, step, count)]
         return _collected(builder, [builder.load(place) for place in places], base)
 
     return Vector(count)(tile, base, rows, first, step), generate
@@ -123,13 +125,81 @@ def _collected(builder: Any, numbers: list[Any], base: Any) -> Any:
     return value
 
 
+def _tuple(like: Any, tile: Any, arguments: tuple[Any, ...], one: Any) -> Any:
+    """Return the signature and the generator of a tuple of vectors, as long as `like`.
+
+    one: makes the vector of a number k from the builder and the values of the arguments.
+    """
+    kind = types.UniTuple(Vector(tile.count), like.count)
+
+    def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
+        return context.make_tuple(builder, kind, [one(builder, values, k) for k in range(like.count)])
+
+    return kind(like, tile, *arguments), generate
+
+
+@intrinsic
+def loads(typing_context, like, tile, base, at, step):  # type: ignore[no-untyped-def]
+    """Return a tuple, as long as `like`, of the vectors that `load` finds at, at + step, ..."""
+
+    def one(builder, values, k):  # type: ignore[no-untyped-def]
+        _, _, base, at, step = values
+        place = builder.add(at, builder.mul(step, at.type(k)))
+        return builder.load(_place(builder, base, place, tile.count), align=8)
+
+    return _tuple(like, tile, (base, at, step), one)
+
+
+@intrinsic
+def loads_rows(typing_context, like, tile, base, rows, first, lane, width):  # type: ignore[no-untyped-def]
+    """Return a tuple of the vectors at the lane of the rows rows[first], rows[first + 1], ... of a width."""
+
+    def one(builder, values, k):  # type: ignore[no-untyped-def]
+        _, _, base, rows, first, lane, width = values
+        row = builder.load(builder.gep(rows, [builder.add(first, first.type(k))]))
+        place = builder.add(builder.mul(row, width), lane)
+        return builder.load(_place(builder, base, place, tile.count), align=8)
+
+    return _tuple(like, tile, (base, rows, first, lane, width), one)
+
+
+@intrinsic
+def gathers(typing_context, like, tile, base, first, step):  # type: ignore[no-untyped-def]
+    """Return a tuple of what `gather` finds from first, first + 1, ... on."""
+
+    def one(builder, values, k):  # type: ignore[no-untyped-def]
+        _, _, base, first, step = values
+        begin = builder.add(first, first.type(k))
+        return _collected(builder, _stepped(builder, begin, step, tile.count), base)
+
+    return _tuple(like, tile, (base, first, step), one)
+
+
+@intrinsic
+def picks(typing_context, like, tile, base, rows, first, step, next_row, next_entry):  # type: ignore[no-untyped-def]
+    """Return a tuple of what `pick` finds; from one to the next first grows by next_row, all indices by next_entry."""
+
+    def one(builder, values, k):  # type: ignore[no-untyped-def]
+        _, _, base, rows, first, step, next_row, next_entry = values
+        begin = builder.add(first, builder.mul(next_row, first.type(k)))
+        places = [builder.gep(rows, [at]) for at in _stepped(builder, begin, step, tile.count)]
+        shifted = builder.gep(base, [builder.mul(next_entry, next_entry.type(k))])
+        return _collected(builder, [builder.load(place) for place in places], shifted)
+
+    return _tuple(like, tile, (base, rows, first, step, next_row, next_entry), one)
+
+
+def _stepped(builder: Any, first: Any, step: Any, count: int) -> list[Any]:
+    return [builder.add(first, builder.mul(step, first.type(k))) for k in range(count)]
+
+
 @intrinsic
 def spread(typing_context, tile, number):  # type: ignore[no-untyped-def]
     """Broadcast a number to all lanes."""
     count = tile.count
 
     def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-        return _spread(builder, arguments[1], count)
+        return spread_value(builder, arguments[1], count)
 
     return Vector(count)(tile, number), generate
 
@@ -191,15 +261,15 @@ def inverse_root(typing_context, x):  # type: ignore[no-untyped-def]
         if not _knows_digits(context, x.count):
             function = ir.FunctionType(kind, [kind])
             found = cgutils.get_or_insert_function(builder.module, function, f"llvm.sqrt.v{x.count}f64")
-            return builder.fdiv(one, builder.call(found, arguments), flags=_FLAGS)
+            return builder.fdiv(one, builder.call(found, arguments), flags=FLAGS)
         near = _near(builder, "rsqrt14", value)
-        off = builder.fsub(one, builder.fmul(value, builder.fmul(near, near, flags=_FLAGS), flags=_FLAGS), flags=_FLAGS)
+        off = builder.fsub(one, builder.fmul(value, builder.fmul(near, near, flags=FLAGS), flags=FLAGS), flags=FLAGS)
         terms = ir.Constant(kind, [0.3125] * x.count)
         for factor in (0.375, 0.5):
-            above = builder.fmul(terms, off, flags=_FLAGS)
-            terms = builder.fadd(above, ir.Constant(kind, [factor] * x.count), flags=_FLAGS)
-        change = builder.fmul(builder.fmul(near, off, flags=_FLAGS), terms, flags=_FLAGS)
-        return builder.fadd(near, change, flags=_FLAGS)
+            above = builder.fmul(terms, off, flags=FLAGS)
+            terms = builder.fadd(above, ir.Constant(kind, [factor] * x.count), flags=FLAGS)
+        change = builder.fmul(builder.fmul(near, off, flags=FLAGS), terms, flags=FLAGS)
+        return builder.fadd(near, change, flags=FLAGS)
 
     return x(x), generate
 
@@ -213,13 +283,13 @@ def reciprocal(typing_context, x):  # type: ignore[no-untyped-def]
         kind = value.type
         one = ir.Constant(kind, [1.0] * x.count)
         if not _knows_digits(context, x.count):
-            return builder.fdiv(one, value, flags=_FLAGS)
+            return builder.fdiv(one, value, flags=FLAGS)
         near = _near(builder, "rcp14", value)
-        off = builder.fsub(one, builder.fmul(value, near, flags=_FLAGS), flags=_FLAGS)
+        off = builder.fsub(one, builder.fmul(value, near, flags=FLAGS), flags=FLAGS)
         terms = off
         for _ in range(2):
-            terms = builder.fadd(builder.fmul(terms, off, flags=_FLAGS), off, flags=_FLAGS)
-        return builder.fadd(builder.fmul(near, terms, flags=_FLAGS), near, flags=_FLAGS)
+            terms = builder.fadd(builder.fmul(terms, off, flags=FLAGS), off, flags=FLAGS)
+        return builder.fadd(builder.fmul(near, terms, flags=FLAGS), near, flags=FLAGS)
 
     return x(x), generate
 
@@ -243,7 +313,7 @@ def inverse_below(typing_context, x, limit):  # type: ignore[no-untyped-def]
         value, limit = arguments
         one, zero = (ir.Constant(value.type, [number] * x.count) for number in (1.0, 0.0))
         below = builder.fcmp_ordered("<", value, limit)
-        return builder.select(below, builder.fdiv(one, value, flags=_FLAGS), zero)
+        return builder.select(below, builder.fdiv(one, value, flags=FLAGS), zero)
 
     return x(x, limit), generate
 
@@ -310,8 +380,8 @@ def _define(operation: Any, instruction: str) -> None:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         count = signature.return_type.count
         kinds = zip(signature.args, arguments, strict=True)
-        values = [value if isinstance(kind, Vector) else _spread(builder, value, count) for kind, value in kinds]
-        return getattr(builder, instruction)(*values, flags=() if len(values) == 1 else _FLAGS)
+        values = [value if isinstance(kind, Vector) else spread_value(builder, value, count) for kind, value in kinds]
+        return getattr(builder, instruction)(*values, flags=() if len(values) == 1 else FLAGS)
 
     numbers = (Vector,) if instruction == "fneg" else (Vector, types.Float)
     for kinds in itertools.product(numbers, repeat=1 if instruction == "fneg" else 2):

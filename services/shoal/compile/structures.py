@@ -34,7 +34,7 @@ def write(place: npt.NDArray[np.float64], structure: tuple[Any, ...]) -> None:
     """
     memory = place.view(np.uint8).data
     end, _ = _laid(structure, 0, memory)
-    assert end <= BYTES
+    assert end <= place.nbytes
 
 
 def _laid(value: Any, at: int, memory: memoryview) -> tuple[int, int]:
@@ -86,13 +86,6 @@ def _layout(kind: Any) -> str:
     return f"{own.__module__}.{own.__qualname__}{kind.fields}({parts})" if own else f"{kind}({parts})"
 
 
-def leading(kind: Any, count: int) -> Reference:
-    """Return the type of a reference to the first members of a structure: code that reads no others serves all
-    structures that begin with these.
-    """
-    return Reference(types.NamedTuple(kind.types[:count], kind.instance_class))
-
-
 @register_model(Reference)
 class _Address(models.PrimitiveModel):  # type: ignore[misc]
     def __init__(self, manager: Any, kind: Reference) -> None:
@@ -110,7 +103,7 @@ class _Members(AttributeTemplate):  # type: ignore[misc]
     def generic_resolve(self, reference: Reference, name: str) -> Any:
         """Return the type of a member."""
         kind = reference.dtype
-        members = dict(zip(kind.fields, kind.types, strict=False))  # see `leading`
+        members = dict(zip(kind.fields, kind.types, strict=True))
         return _member(members[name]) if name in members else None
 
 

@@ -21,10 +21,10 @@ class Applied(NamedTuple):
     a torque n * function(t) [N m] on a body, as n x d/2 on each of its directors; turned: twelve rows each, those of n
     and of the directors. twisting: the same on a node of a director rod, as (n x r')/|r'|^2 on its slope r' and the
     rest along it on its director d; twisted: nine rows each, of n, r' and d. share: how much of
-    the torques in space acts. space: a tuple as long as vectors are.
+    the torques in space acts. dimensions: of vectors.
     """
 
-    space: tuple[int, ...]
+    dimensions: int
 
     fixed: int
     row: Index
@@ -61,7 +61,7 @@ def add_force(
             load = loads.coefficient[number * width + lane] * strength
             f[row + lane] += load
             power[lane] -= load * zdot[row + lane]
-    if len(loads.space) == 3:
+    if loads.dimensions == 3:
         _add_spatial(tile, loads, functions, t, z, zdot, f, power)
         return
     for number in range(loads.following):

@@ -42,7 +42,7 @@ def _respond(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, to
     """Gradients and responses of the gaps that are wanted in some lane, and the values and rates of all."""
     look(tile, m, w, z, zdot)
     g, width, n, c = w.gaps, len(tile), m.unknowns, m.constraints.size
-    rows, first = 3 * len(m.space), 3 * len(m.space)
+    rows, first = 3 * m.dimensions, 3 * m.dimensions
     for i in range(c * width):
         g.reaction[(m.gaps.size + 1) * c * width + i] = w.gauss.multiplier[i]
     for row in range(m.rows):

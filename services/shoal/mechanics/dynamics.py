@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import literal_unroll, njit
+from numba import njit
 
 from shoal.compile import function_pointers, simd, structures
-from shoal.compile.pointers import pointer, raw
+from shoal.compile.pointers import pointer, raw, shift
 from shoal.compile.vector import clear
 from shoal.mechanics import applied, constraints, forces, gaps, rubbing
 from shoal.mechanics.derived import Derived, derive, fold
-from shoal.mechanics.elements import families
+from shoal.mechanics.elements.families import LAID
 from shoal.mechanics.least import principle
 from shoal.mechanics.least import work as least
 from shoal.mechanics.model import Arrays
@@ -160,19 +160,21 @@ def _add_weight(tile: Tile, m: Arrays, z: Array, f: Array, moving: bool) -> None
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _add_elements(tile: Tile, m: Arrays, w: Work, z: Array, zdot: Array, f: Array, part: int) -> None:
     """Add the force of the elements, and pass all that is on derived rows to the unknowns."""
-    kind, moving = -1, part in (ALL, ACCELERATION)
-    for family in literal_unroll(m.elements):
-        kind += 1
-        if family.size > 0 and not (part == SIMPLE and families.is_exact(family)):
-            function_pointers.call(m.table.force[kind], (tile, family, z, zdot, f, w.element, w.power, moving))
+    table, moving = m.table, part in (ALL, ACCELERATION)
+    for kind in range(table.families):
+        if table.force[kind] != 0 and not (part == SIMPLE and table.mean[kind] != 0):
+            family = shift(m.families, LAID * kind)
+            function_pointers.call(table.force[kind], (tile, family, z, zdot, f, w.element, w.power, moving))
     fold(tile, m.derived, f, m.force_rows)
 
 
 @njit(cache=True, error_model="numpy")
 def add_mean_force(tile: Tile, m: Arrays, w: Work, before: Array, after: Array, f: Array) -> None:
     """Add the force of those elements whose mean over a step does exactly the work of their energy (Simo, Tarnow)."""
-    for family in literal_unroll(m.elements):
-        families.add_mean_force(tile, family, before, after, f, w.element)
+    for kind in range(m.table.families):
+        if m.table.mean[kind] != 0:
+            family = shift(m.families, LAID * kind)
+            function_pointers.call(m.table.mean[kind], (tile, family, before, after, f, w.element))
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -191,7 +193,7 @@ def accelerate(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, 
 def solve(tile: Tile, m: Arrays, w: Work, a: Array) -> None:
     """Turn a force into the acceleration of a machine without constraints."""
     if m.alike.components > 0:
-        alike.solve(tile, m.space, m.alike, w.element, a)
+        alike.solve(tile, m.alike, w.element, a)
     else:
         sparse.solve(tile, m.pattern, m.mass_factor, a, 0)
 
@@ -233,7 +235,7 @@ def _constrain(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, 
 def multiply_mass(tile: Tile, m: Arrays, x: Array, y: Array) -> None:
     """y = M x; (rows, lanes)."""
     if m.alike.components > 0:
-        alike.multiply(tile, m.space, m.alike, x, y)
+        alike.multiply(tile, m.alike, x, y)
     else:
         sparse.multiply(tile, m.pattern, m.mass, x, y)
 
@@ -263,10 +265,9 @@ def energies(tile: Tile, m: Arrays, w: Work) -> None:
     clear(tile, w.energy, 1)
     simd.store(w.energy, 2 * width, lifted)
     derive(tile, m.derived, w.z, m.unknowns, m.force_rows, False)
-    kind = -1
-    for family in literal_unroll(m.elements):
-        kind += 1
-        if family.size > 0:
+    for kind in range(m.table.families):
+        if m.table.energy[kind] != 0:
+            family = shift(m.families, LAID * kind)
             function_pointers.call(m.table.energy[kind], (tile, family, w.z, w.element, w.energy, 1))
     simd.store(w.energy, 3 * width, simd.load(tile, w.energy, width))
     forces.add_energy(tile, m.forces, m.functions, w.z, w.memory, w.element, w.energy, 1)

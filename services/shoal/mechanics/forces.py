@@ -30,14 +30,14 @@ _TURN = 2.0 * np.pi
 class Forces(NamedTuple):
     """Force elements of one tile.
 
-    space: a tuple as long as vectors are, here d. kind: DISTANCE, ANGLE or PLACE. rows: 3 d an element, of (a, b, d);
+    dimensions: of vectors, here d. kind: DISTANCE, ANGLE or PLACE. rows: 3 d an element, of (a, b, d);
     where d is not used, any valid rows. Directions need not be unit vectors. table: function of x, the elastic force
     [N or N m], and energy, its antiderivative; drive: function of time; -1 for none. law: (8 * elements, lanes), eight
     rows an element: stiffness k, cubic k3, damping c, natural value g0, Coulomb limit F_c, Coulomb speed v_s (matters
     and must be positive where F_c is not 0), amplitude of the drive, drag c2.
     """
 
-    space: tuple[int, ...]
+    dimensions: int
     size: int
     kind: Index
     rows: Index
@@ -53,7 +53,7 @@ class Forces(NamedTuple):
 @njit(cache=True, forceinline=True)
 def side(forces: Forces) -> int:
     """Rows of one element, 3 d."""
-    return 3 * len(forces.space)
+    return 3 * forces.dimensions
 
 
 @njit(cache=True, forceinline=True)
@@ -69,7 +69,7 @@ def initial_memory(tile: Tile, forces: Forces, z: Array, intended: Array) -> Arr
     z: flat coordinates, derived rows filled; intended: angles [rad], flat (elements, lanes), from which the whole
     turns are taken (the rest follows from z), so that a spring can be wound up at the start.
     """
-    d = len(forces.space)
+    d = forces.dimensions
     rows, at = forces.rows.reshape(-1, 3 * d), z.reshape(-1, len(tile))
     first, second = (np.stack([at[rows[:, k]], at[rows[:, k + 1]]]) for k in (0, d))
     if d == plane.DIMENSIONS:
@@ -139,7 +139,7 @@ def _bend_turn(width: int, lane: int, elastic: float, w: Array, out: Array, base
 @njit(cache=True, error_model="numpy")
 def remember(tile: Tile, forces: Forces, z: Array, memory: Array) -> None:
     """Follow the angles after a step of less than half a turn; memory: (elements, lanes). Pointers."""
-    width, d = len(tile), len(forces.space)
+    width, d = len(tile), forces.dimensions
     for number in range(forces.size):
         if forces.kind[number] == ANGLE and d == 3:
             first = 9 * number
@@ -162,7 +162,7 @@ def remember(tile: Tile, forces: Forces, z: Array, memory: Array) -> None:
 @njit(cache=True, error_model="numpy")
 def _gradient(tile: Tile, forces: Forces, number: int, z: Array, w: Array) -> None:
     """Coordinates, dg/dz and, but for the turns of an angle, g of an element into w."""
-    width, d, rows = len(tile), len(forces.space), side(forces)
+    width, d, rows = len(tile), forces.dimensions, side(forces)
     kind = forces.kind[number]
     for k in range(rows):
         copy(tile, w, k, z, forces.rows[rows * number + k])
@@ -201,7 +201,7 @@ def _gradient(tile: Tile, forces: Forces, number: int, z: Array, w: Array) -> No
 @njit(cache=True, error_model="numpy")
 def measure(tile: Tile, forces: Forces, number: int, z: Array, memory: Array, w: Array) -> None:
     """Compute `_gradient` with x = g - g0 in place of g."""
-    width, d = len(tile), len(forces.space)
+    width, d = len(tile), forces.dimensions
     _gradient(tile, forces, number, z, w)
     natural, row = (LAW * number + NATURAL) * width, value_row(forces) * width
     for lane in range(width):
@@ -307,7 +307,7 @@ def tangent(
     A block refers to the places of the element's row list, also where rows repeat; it is not positive definite in
     general. w: work space of 6 d + 3 rows. Pointers.
     """
-    width, d, rows = len(tile), len(forces.space), side(forces)
+    width, d, rows = len(tile), forces.dimensions, side(forces)
     for number in range(forces.size):
         measure(tile, forces, number, z, memory, w)
         kind, table = forces.kind[number], forces.table[number]

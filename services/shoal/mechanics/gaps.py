@@ -91,7 +91,7 @@ def look(tile: Tile, gaps: Gaps, z: Array, zdot: Array, g: GapWork, room: Array)
 @njit(cache=True, error_model="numpy")
 def bias(tile: Tile, gaps: Gaps, number: int, lane: int, z: Array, zdot: Array) -> float:
     """Return the second derivative of a gap by time for accelerations of zero, zdot' g_qq zdot, in one lane."""
-    width, d, first = len(tile), len(gaps.measures.space), 3 * len(gaps.measures.space) * number
+    width, d, first = len(tile), gaps.measures.dimensions, 3 * gaps.measures.dimensions * number
     rows, kind = gaps.measures.rows, gaps.measures.kind[number]
     sign = gaps.sign[number * width + lane]
     if kind == ANGLE and d == 2:

@@ -20,13 +20,14 @@ from numba import njit, typeof, types
 from shoal.compile import function_pointers, locks
 from shoal.compile.function_pointers import call
 from shoal.compile.pointers import raw_type
-from shoal.compile.structures import Reference, leading, storage
+from shoal.compile.structures import Reference, storage
 from shoal.mechanics import contact, dynamics
 from shoal.mechanics.dynamics import ACCELERATION, ALL, ELASTIC, SIMPLE, Work, instant
 from shoal.mechanics.elements import families
+from shoal.mechanics.elements.families import KERNELS
 from shoal.mechanics.least import drift, principle
 from shoal.mechanics.least.principle import PROJECTION
-from shoal.mechanics.model import COMMON, Arrays, FunctionTable
+from shoal.mechanics.model import Arrays, FunctionTable, seen
 from shoal.mechanics.numerics.tile import SINGLE, Array, Index, Tile, index
 
 Kernel = tuple[Any, tuple[Any, ...]]
@@ -91,6 +92,12 @@ def settle(
 def meet(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float) -> None:
     """Let driven constraints take up their new rates at once: a plastic impact, the least change in the mass metric."""
     call(m.table.settle, (tile, m, w, t, tolerance, 3, False))
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def project_rates(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float) -> None:
+    """`drift.project_rates`: the same without the change of the coordinates."""
+    call(m.table.settle, (tile, m, w, t, tolerance, 0, False))
 
 
 @njit(cache=True, error_model="numpy")
@@ -162,13 +169,13 @@ def _energy(tile, family, z, w, energy, row):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _stiffness(tile, family, z, w, out, first):  # type: ignore[no-untyped-def]
-    families.tangent(tile, family, z, w, out, first)
+def _mean(tile, family, before, after, f, w):  # type: ignore[no-untyped-def]
+    families.add_mean_force(tile, family, before, after, f, w)
 
 
 @njit(cache=True, error_model="numpy")
-def _damping(tile, family, z, w, out, first):  # type: ignore[no-untyped-def]
-    families.damping(tile, family, z, w, out, first)
+def _stiffness(tile, family, z, w, out, first, viscous):  # type: ignore[no-untyped-def]
+    families.tangent(tile, family, z, w, out, first, viscous)
 
 
 _NUMBER, _COUNT, _FLAG, _ROWS = types.float64, types.int64, types.boolean, types.CPointer(types.float64)
@@ -189,48 +196,48 @@ _FREE, _CONSTRAINED = ("motion", "energies"), ("constrain", "least", "settle")
 _CONTACTS = ("look", "contact", "hold", "decide")
 _USUAL = (*_FREE, *_CONSTRAINED)
 """Those of all machines, of those with constraints, and of those with gaps; the first two are compiled beforehand."""
-_OF_CONSTRAINTS = ("least", "settle")
-"""Those that are the same in the plane and in space."""
 _FAMILY_KERNELS: dict[str, Kernel] = {
     "force": (_force, (_ROWS, _ROWS, _ROWS, _ROWS, _ROWS, _FLAG)),
     "energy": (_energy, (_ROWS, _ROWS, _ROWS, _COUNT)),
-    "stiffness": (_stiffness, (_ROWS, _ROWS, _ROWS, _COUNT)),
-    "damping": (_damping, (_ROWS, _ROWS, _ROWS, _COUNT)),
+    "mean": (_mean, (_ROWS, _ROWS, _ROWS, _ROWS)),
+    "stiffness": (_stiffness, (_ROWS, _ROWS, _ROWS, _COUNT, _FLAG)),
 }
 """Kernels of one family of elements, and the types of their arguments after the tile and the family."""
 
 locks.install()
 _FOUND: dict[tuple[Any, ...], int] = {}
-_READY: dict[tuple[int, int, bool, bool, tuple[bool, ...]], FunctionTable] = {}
+_READY: dict[tuple[Any, ...], FunctionTable] = {}
 
 
 def ready(tile: Tile, arrays: Arrays, room: Work) -> Arrays:
     """Return the same arrays with storage of their own and pointers to the kernels that they call."""
-    acting = tuple(family.size > 0 for family in arrays.elements)
-    key = len(tile), len(arrays.space), arrays.constraints.size > 0, arrays.gaps.size > 0, acting
+    acting = tuple(type(family) if family.size > 0 else None for family in arrays.elements)
+    key = len(tile), arrays.constraints.size > 0, arrays.gaps.size > 0, acting
     if key not in _READY:
         wanted = _wanted(arrays)
         state = [_address(name, tile, arrays, room) if name in wanted else 0 for name in _STATE_KERNELS]
-        force, energy = (family_pointers(name, tile, arrays.elements) for name in ("force", "energy"))
-        _READY[key] = FunctionTable._make([*state, force, energy, 0])
+        pointers = (family_pointers(name, tile, arrays.elements) for name in ("force", "energy", "mean"))
+        _READY[key] = FunctionTable._make([*state, len(acting), *pointers, 0])
     return arrays._replace(storage=storage(), table=_READY[key])
 
 
 def family_pointers(name: str, tile: Tile, elements: tuple[Any, ...]) -> Index:
-    """Addresses of "force", "energy", "stiffness" or "damping" by family; 0 for a family that has none of it."""
-    wanted = [family.size > 0 and (family.damped or name != "damping") for family in elements]
-    return index([_address(name, tile, one) if want else 0 for one, want in zip(elements, wanted, strict=True)])
+    """Addresses of "force", "energy", "mean" or "stiffness" by family; 0 for a family that has none of it."""
+    return index([_address(name, tile, one) if one.size > 0 and _has(name, one) else 0 for one in elements])
+
+
+def _has(name: str, family: Any) -> bool:
+    return name != "mean" or KERNELS[type(family)].exact
 
 
 def signatures(tile: Tile, arrays: Arrays, room: Work, *, every: bool = False) -> list[Kernel]:
     """Return the kernels that `ready` compiles, and the stiffness, for limits of stability and implicit steps.
 
-    every: the kernels of any model, for one lane those of damping as well, for small motions
+    every: the kernels of any model
     """
     found = [_kernel(name, tile, arrays, room) for name in (_USUAL if every else _wanted(arrays))]
     elements = [family for family in arrays.elements if every or family.size > 0]
-    names = list(_FAMILY_KERNELS) if every and tile == SINGLE else ["force", "energy", "stiffness"]
-    return found + [_kernel(name, tile, one) for name in names for one in elements]
+    return found + [_kernel(name, tile, one) for name in _FAMILY_KERNELS for one in elements if _has(name, one)]
 
 
 def _wanted(arrays: Arrays) -> tuple[str, ...]:
@@ -240,14 +247,14 @@ def _wanted(arrays: Arrays) -> tuple[str, ...]:
 
 def _kernel(name: str, tile: Tile, *parts: Any) -> Kernel:
     """Return the kernel for these structures, those of a state or a family, with its argument types."""
-    raws = [raw_type(typeof(part)) for part in parts]
     if name in _FAMILY_KERNELS:
+        (family,) = parts
         kernel, own = _FAMILY_KERNELS[name]
-        return kernel, (typeof(tile), *raws, *own)
+        kind: Any = (KERNELS[type(family)].tangent if name == "stiffness" else None) or type(family)
+        return kernel, (typeof(tile), Reference(raw_type(typeof(kind._make(family)))), *own)
+    arrays, room = parts
     kernel, own = _STATE_KERNELS[name]
-    model, room = raws
-    kind = leading(model, COMMON) if name in _OF_CONSTRAINTS else Reference(model)
-    return kernel, (typeof(tile), kind, Reference(room), *own)
+    return kernel, (typeof(tile), *(Reference(raw_type(typeof(part))) for part in (seen(arrays), room)), *own)
 
 
 _planning = ContextVar("planning", default=False)
@@ -264,7 +271,7 @@ def planned() -> Iterator[None]:
 
 
 def _address(name: str, tile: Tile, *parts: Any) -> int:
-    key = name, len(tile), type(parts[0]), len(getattr(parts[0], "space", ()))
+    key = name, len(tile), type(parts[0])
     return address(key, lambda: _kernel(name, tile, *parts))
 
 

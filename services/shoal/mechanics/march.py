@@ -46,10 +46,9 @@ from shoal.mechanics.marched import (
     Marched,
     frame_type,
     framed,
-    loop_of,
     sampled,
 )
-from shoal.mechanics.model import Arrays
+from shoal.mechanics.model import Arrays, seen
 from shoal.mechanics.numerics.tile import Array, Index, Tile
 
 ASSEMBLY = 30
@@ -82,13 +81,14 @@ class March:
         """seconds: that a step takes, by order of magnitude."""
         self.frame, self._first = frame, PAUSE / seconds
         self._storage = structures.storage()
-        structures.write(frame.arrays.storage, frame.arrays)
+        arrays = seen(frame.arrays)
+        structures.write(arrays.storage, arrays)
         structures.write(frame.room.storage, frame.room)
-        structures.write(self._storage, frame)
-        kinds = loop_of(frame)
-        if kinds not in _LOOPS:
-            _LOOPS[kinds] = function_pointers.address(loop, (frame_type(frame),))
-        self._loop = _LOOPS[kinds]
+        structures.write(self._storage, frame._replace(arrays=arrays))
+        width = len(frame.tile)
+        if width not in _LOOPS:
+            _LOOPS[width] = function_pointers.address(loop, (frame_type(frame),))
+        self._loop = _LOOPS[width]
 
     def __call__(self, stop: threading.Event | None = None) -> None:
         """Run; the record is in the frame, the state at the end in its room. Holds no lock of the interpreter.
@@ -123,8 +123,8 @@ class March:
         return bool(CREEPING * left * (now - begin) < rest * (number - first))
 
 
-_LOOPS: dict[tuple[Any, ...], int] = {}
-"""Addresses of the compiled loops."""
+_LOOPS: dict[int, int] = {}
+"""Addresses of the compiled loops, by the width of a tile."""
 
 
 def march(*arguments: Any) -> Marched:
@@ -223,7 +223,7 @@ def _begin(tile: Tile, m: Arrays, w: Work, k: LoopRoom, record: Marched, marker_
         k.last_power[lane] = w.power[lane]
     _energy(tile, m, w, k.start, record.energy_scale)
     _count_turns(tile, m, w, k, marker_rows)
-    for i in range(marker_rows.size // (2 * len(m.space)) * len(tile)):
+    for i in range(marker_rows.size // (2 * m.dimensions) * len(tile)):
         k.turns[i] = 0.0
     if m.gaps.size > 0:
         k.progress[EVENT] = events.touching(tile, m, w)
@@ -244,7 +244,7 @@ def _sample(
     sample: int,
 ) -> None:
     """The markers at a time that is `ahead` [s] of the end of the last step, of length `taken`."""
-    width, d = len(tile), len(m.space)
+    width, d = len(tile), m.dimensions
     inside = abs(ahead) > slack
     if not inside:
         for i in range(m.unknowns * width):
@@ -411,7 +411,7 @@ def _look(tile: Tile, m: Arrays, w: Work, own: LoopRoom, now: float, record: Mar
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _count_turns(tile: Tile, m: Arrays, w: Work, k: LoopRoom, marker_rows: Index) -> None:
     """Add 2 pi to the turns where a marker's direction has passed the negative x axis."""
-    width, d = len(tile), len(m.space)
+    width, d = len(tile), m.dimensions
     for marker in range(marker_rows.size // (2 * d)):
         rows = marker_rows[2 * d * marker + d], marker_rows[2 * d * marker + d + 1]
         for row in rows:

@@ -13,7 +13,7 @@ from shoal.mechanics import constraints
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.halts import Halts
 from shoal.mechanics.integrators.scheme import Scheme
-from shoal.mechanics.model import Arrays
+from shoal.mechanics.model import Arrays, seen
 from shoal.mechanics.numerics.tile import Array, Index, Tile
 
 TURN = 2.0 * np.pi
@@ -86,7 +86,7 @@ def sampled(dimensions: int) -> int:
 
 def rooms(tile: Tile, arrays: Arrays, times: int, marker_rows: Index) -> tuple[Marched, LoopRoom]:
     """An empty record, and the room of the loop."""
-    width, dimensions = len(tile), len(arrays.space)
+    width, dimensions = len(tile), arrays.dimensions
     end, rows = arrays.unknowns * width, arrays.rows * width
     markers = marker_rows.size // (2 * dimensions)
     record = Marched(
@@ -170,14 +170,9 @@ def framed(
     )  # fmt: skip
 
 
-def loop_of(frame: Frame) -> tuple[int, int]:
-    """Return the key of a frame's type: frames with equal keys share a compiled loop."""
-    return len(frame.tile), len(frame.arrays.space)
-
-
 def frame_type(frame: Frame) -> Any:
     """The compiler's type of a frame's place in memory, which takes a millisecond to find."""
-    return Reference(raw_type(typeof(frame)))
+    return Reference(raw_type(typeof(frame._replace(arrays=seen(frame.arrays)))))
 
 
 FARTHEST, ENERGY_DRIFT, CONSTRAINT_DRIFT, ENERGY_SCALE = range(4)

@@ -21,6 +21,7 @@ from shoal.mechanics import saddle
 from shoal.mechanics.applied import Applied
 from shoal.mechanics.constraints import Constraints
 from shoal.mechanics.derived import Derived
+from shoal.mechanics.elements.families import lay
 from shoal.mechanics.forces import LAW, STIFFNESS, Forces
 from shoal.mechanics.frames import Frame, ModalFrame
 from shoal.mechanics.functions import Functions, Piecewise
@@ -39,7 +40,8 @@ from shoal.scene.joints import places
 class FunctionTable(NamedTuple):
     """Addresses of the compiled `kernels` for one tile; 0 for a kernel that the model never calls.
 
-    force, energy: by family of elements. sought: what seeks accelerations in place of `least`.
+    families: their number. force, energy, mean: by family of elements; mean: of those that know the exact mean force
+    of a step. sought: what seeks accelerations in place of `least`.
     """
 
     motion: int
@@ -51,17 +53,20 @@ class FunctionTable(NamedTuple):
     contact: int
     hold: int
     decide: int
+    families: int
     force: Index
     energy: Index
+    mean: Index
     sought: int = 0
 
 
 class Arrays(NamedTuple):
-    """All a kernel needs of one tile of lanes. space: a tuple as long as vectors are, in the plane and in space.
+    """All a kernel needs of one tile of lanes. dimensions: of vectors.
 
     method, baumgarte: how accelerations are found. mass_factor, mass_root: of the regularised mass matrix; lent: the
     mass added to flat bodies, empty where none is; refinements: iterations that compensate it, see `least.lent`.
-    elements: one structure a family. alike: the mass matrix where all lanes have the same one.
+    families: the elements as kernels read them, `families.lay`. alike: the mass matrix where all lanes have the same
+    one. elements: one structure a family; kernels do not see them, see `seen`.
     """
 
     storage: Array
@@ -88,15 +93,17 @@ class Arrays(NamedTuple):
     constraints: Constraints
     saddle: Saddle
     rubbing: Rubbing
-    space: tuple[int, ...]
-    elements: tuple[Any, ...]
+    dimensions: int
     forces: Forces
     applied: Applied
     gaps: Gaps
+    families: Array
+    elements: tuple[Any, ...]
 
 
-COMMON = Arrays._fields.index("space")
-"""Number of the first members, which have the same types in the plane and in space."""
+def seen(arrays: Arrays) -> Arrays:
+    """Return what kernels see, which has one type for all models: families of elements are called by addresses."""
+    return arrays._replace(elements=())
 
 
 @njit(cache=True)
@@ -294,12 +301,12 @@ class Model:
         weightless = ~known | (np.where(known, inverse, 0.0) * whole >= _SINGULAR)
         if np.any(weightless):
             raise self._singular({*(np.flatnonzero(weightless) // len(tile)).tolist()})
-        forces = self.elements, self.forces, self.applied, self.gaps
-        parts = self.functions, self.constraints, self._saddle, self.rubbing, (0,) * self.dimensions, *forces
-        nobody = np.zeros(len(self.elements), dtype=np.int64)
+        parts = self.functions, self.constraints, self._saddle, self.rubbing, self.dimensions
+        elements, nobody = packed(self.elements, lanes, tile), np.zeros(len(self.elements), dtype=np.int64)
+        own: tuple[Any, ...] = packed((*parts, self.forces, self.applied, self.gaps), lanes, tile)
         return Arrays(
             structures.storage(),
-            FunctionTable(0, 0, 0, 0, 0, 0, 0, 0, 0, nobody, nobody),
+            FunctionTable(0, 0, 0, 0, 0, 0, 0, 0, 0, len(nobody), nobody, nobody, nobody),
             self.unknowns,
             self.force_rows,
             self.held_rows,
@@ -318,7 +325,7 @@ class Model:
             REFINEMENTS if self.flat else 0,
             self._alike,
             pack(self.weight, lanes, tile),
-            *packed(parts, lanes, tile),
+            *(*own, lay(elements), elements),
         )
 
 

@@ -6,14 +6,16 @@ import itertools
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import literal_unroll, njit, typeof, types
+from numba import njit, typeof, types
 
 from shoal.compile import function_pointers, simd
-from shoal.compile.pointers import pointer, raw, shift
+from shoal.compile.pointers import pointer, raw, raw_type, shift
+from shoal.compile.structures import Reference
 from shoal.compile.vector import add, add_product
 from shoal.mechanics import forces, kernels, saddle
-from shoal.mechanics.dynamics import Work, derived_rows
-from shoal.mechanics.model import Arrays, Model, scatter
+from shoal.mechanics.dynamics import Work, derived_rows, work_space
+from shoal.mechanics.elements.families import LAID
+from shoal.mechanics.model import Arrays, Model, scatter, seen
 from shoal.mechanics.numerics import sparse
 from shoal.mechanics.numerics.tile import Array, Index, Tile, index, pack, stacked
 
@@ -41,7 +43,8 @@ class Tangent(NamedTuple):
     rows. Its row source[s] adds to slot s, where none does, a row of zeros behind two such blocks; row more[k] adds to
     slot also[k], too. Share k adds part[k] * block[shared[k]] to slot[k], for elements whose rows are sums of
     coordinates. Curvature k adds bend[k] * multiplier[owner[k]] to
-    curvature[k]. stiffness, damping: addresses of the kernels of each family. held: where the constraints' rows are.
+    curvature[k]. By family: sizes, rows of its blocks; stiffness, the address of its kernel; damped, 1 or 0. assemble:
+    address of the kernel of `assemble`, see `assembled`. held: where the constraints' rows are.
     """
 
     pattern: sparse.Pattern
@@ -59,8 +62,10 @@ class Tangent(NamedTuple):
     curvature: Index
     owner: Index
     bend: Array
+    sizes: Index
     stiffness: Index
-    damping: Index
+    damped: Index
+    assemble: int
     held: Held
 
 
@@ -104,8 +109,10 @@ def tangent_tile(model: Model, tile: Tile, lanes: slice, *, held: bool = False) 
         index([slot[key] for key, *_ in curved]),
         index([owner for _, owner, _ in curved]),
         pack(stacked([c for *_, c in curved]), lanes, tile),
+        index([family.side * family.side * family.size for family in model.elements]),
         kernels.family_pointers("stiffness", tile, model.elements),
-        kernels.family_pointers("damping", tile, model.elements),
+        index([1 if family.damped else 0 for family in model.elements]),
+        0,
         constrained,
     )
 
@@ -142,7 +149,7 @@ def _contributions(model: Model) -> tuple[list[tuple[tuple[int, int], int, Array
     found = []
     position = 0
     counts = [(family, family.side) for family in model.elements]
-    for family, size in (*counts, (model.forces, forces.side(model.forces))):
+    for family, size in (*counts, (model.forces, 3 * model.forces.dimensions)):
         for rows in family.rows[: family.size * size].reshape(family.size, size).tolist():
             expanded = [_expand(model, row) for row in rows]
             for a, b in itertools.product(range(size), repeat=2):
@@ -154,7 +161,24 @@ def _contributions(model: Model) -> tuple[list[tuple[tuple[int, int], int, Array
     return found, position
 
 
-@njit(cache=True, error_model="numpy")
+def assembled(model: Model, tile: Tile, lanes: slice, tangent: Tangent) -> Tangent:
+    """Return a tangent with the kernel of `assemble`, compiled or from the cache."""
+
+    def kernel() -> kernels.Kernel:
+        arrays = model.tile(tile, lanes)
+        return assembly(tile, arrays, work_space(tile, arrays), tangent)
+
+    return tangent._replace(assemble=kernels.address(("assemble", len(tile)), kernel))
+
+
+def assembly(tile: Tile, arrays: Arrays, room: Work, tangent: Tangent) -> kernels.Kernel:
+    """Return the kernel of `assemble` with the types of its arguments."""
+    m, t, w = (Reference(raw_type(typeof(part))) for part in (seen(arrays), tangent, room))
+    number, rows = types.float64, types.CPointer(types.float64)
+    return _assemble, (typeof(tile), m, t, w, rows, rows, number, number, rows, rows, types.int64)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
 def assemble(
     tile: Tile,
     m: Arrays,
@@ -173,14 +197,20 @@ def assemble(
     multiplier: one lambda per constraint, (constraints, lanes); block: work space of 2 t.blocks rows and one of zeros.
     The derived rows of z, and those of w.zdot where anything is damped, must be filled. Pointers.
     """
-    width = len(tile)
-    _fill(tile, m, t, w, z, block)
-    if damping_factor != 0.0 and (m.forces.size > 0 or m.damped):
-        end = t.blocks * width
-        other = shift(block, end)
-        _fill_damping(tile, m, t, w, z, other)
+    function_pointers.call(
+        t.assemble, (tile, m, t, w, z, multiplier, mass_factor, damping_factor, block, values, slots)
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def _assemble(tile, m, t, w, z, multiplier, mass_factor, damping_factor, block, values, slots):  # type: ignore[no-untyped-def]
+    width, end = len(tile), t.blocks * len(tile)
+    damped = damping_factor != 0.0 and (m.forces.size > 0 or m.damped)
+    for part in range(2 if damped else 1):
+        _fill(tile, m, t, w, z, shift(block, part * end), part == 1)
+    if damped:
         for i in range(end):
-            block[i] += damping_factor * other[i]
+            block[i] += damping_factor * block[end + i]
     for slot in range(slots):
         first = simd.load(tile, block, t.source[slot] * width)
         simd.store(values, slot * width, mass_factor * simd.load(tile, t.mass, slot * width) + first)
@@ -193,39 +223,25 @@ def assemble(
 
 
 @njit(cache=True, error_model="numpy")
-def _fill(tile: Tile, m: Arrays, t: Tangent, w: Work, z: Array, block: Array) -> None:
-    """The stiffness of all elements, family by family, then of the forces."""
-    first, kind = 0, -1
-    for family in literal_unroll(m.elements):
-        kind += 1
-        if family.size > 0:
-            function_pointers.call(t.stiffness[kind], (tile, family, z, w.element, block, first))
-        first += family.side * family.side * family.size
-    forces.tangent(tile, m.forces, m.functions, z, w.memory, w.element, block, first)
-
-
-@njit(cache=True, error_model="numpy")
-def _fill_damping(tile: Tile, m: Arrays, t: Tangent, w: Work, z: Array, block: Array) -> None:
-    """The same of the damping."""
-    for i in range(t.blocks * len(tile)):
+def _fill(tile: Tile, m: Arrays, t: Tangent, w: Work, z: Array, block: Array, viscous: bool) -> None:
+    """The stiffness of all elements, or their damping, family by family, then of the forces."""
+    first = 0
+    for i in range(t.blocks * len(tile) if viscous else 0):
         block[i] = 0.0
-    first, kind = 0, -1
-    for family in literal_unroll(m.elements):
-        kind += 1
-        if family.size > 0 and family.damped:
-            function_pointers.call(t.damping[kind], (tile, family, z, w.element, block, first))
-        first += family.side * family.side * family.size
-    forces.damping(tile, m.forces, z, w.zdot, w.element, block, first)
+    for kind in range(m.table.families):
+        if t.stiffness[kind] != 0 and (t.damped[kind] != 0 or not viscous):
+            family = shift(m.families, LAID * kind)
+            function_pointers.call(t.stiffness[kind], (tile, family, z, w.element, block, first, viscous))
+        first += t.sizes[kind]
+    if viscous:
+        forces.damping(tile, m.forces, z, w.zdot, w.element, block, first)
+    else:
+        forces.tangent(tile, m.forces, m.functions, z, w.memory, w.element, block, first)
 
 
 def stiffness_at(tile: Tile, arrays: Arrays, tangent: Tangent, room: Work) -> Array:
     """K at the state in `room`, without constraints; (slots, lanes)."""
-    derived_rows(tile, arrays, room)
-    block, first = np.zeros(tangent.blocks * len(tile)), 0
-    for family, address in zip(arrays.elements, tangent.stiffness.tolist(), strict=True):
-        if family.size > 0:
-            _of_family(tile, address, family, room.z, room.element, block, first)
-        first += family.side * family.side * family.size
+    block, first = _of_elements(tile, arrays, tangent, room, viscous=False)
     if arrays.forces.size > 0:
         _of_forces(tile, arrays.forces, arrays.functions, room.z, room.memory, room.element, block, first)
     return _assembled(tile, tangent, block)
@@ -233,15 +249,22 @@ def stiffness_at(tile: Tile, arrays: Arrays, tangent: Tangent, room: Work) -> Ar
 
 def damping_at(tile: Tile, arrays: Arrays, tangent: Tangent, room: Work) -> Array:
     """D at the state in `room`, (slots, lanes)."""
-    derived_rows(tile, arrays, room)
-    block, first = np.zeros(tangent.blocks * len(tile)), 0
-    for family, address in zip(arrays.elements, tangent.damping.tolist(), strict=True):
-        if family.size > 0 and family.damped:
-            _of_family(tile, address, family, room.z, room.element, block, first)
-        first += family.side * family.side * family.size
+    block, first = _of_elements(tile, arrays, tangent, room, viscous=True)
     if arrays.forces.size > 0:
         _of_dampers(tile, arrays.forces, room.z, room.zdot, room.element, block, first)
     return _assembled(tile, tangent, block)
+
+
+def _of_elements(tile: Tile, arrays: Arrays, tangent: Tangent, room: Work, *, viscous: bool) -> tuple[Array, int]:
+    """Blocks of all elements at the state in `room`, (blocks, lanes), and the number of their rows."""
+    derived_rows(tile, arrays, room)
+    block, first = np.zeros(tangent.blocks * len(tile)), 0
+    for kind, family in enumerate(arrays.elements):
+        if family.size > 0 and (family.damped or not viscous):
+            place, address = arrays.families[LAID * kind :], int(tangent.stiffness[kind])
+            _of_family(tile, address, place, room.z, room.element, block, first, viscous)
+        first += int(tangent.sizes[kind])
+    return block, first
 
 
 def _assembled(tile: Tile, t: Tangent, block: Array) -> Array:
@@ -254,22 +277,27 @@ def _assembled(tile: Tile, t: Tangent, block: Array) -> Array:
 
 
 def signatures(tile: Tile, arrays: Arrays, room: Work) -> list[kernels.Kernel]:
-    """Return the kernels of `stiffness_at` and `damping_at`, with the types of their arguments."""
+    """Return the kernels of `stiffness_at` and `damping_at`, with the types of their arguments.
+
+    Of lanes the stability limit needs those of the stiffness.
+    """
     lanes, rows, number = typeof(tile), typeof(room.z), types.int64
     springs, functions = typeof(arrays.forces), typeof(arrays.functions)
-    families = [(_of_family, (lanes, number, typeof(one), rows, rows, rows, number)) for one in arrays.elements]
+    of_family = _of_family, (lanes, number, *(rows,) * 4, number, types.boolean)
     of_forces = _of_forces, (lanes, springs, functions, rows, rows, rows, rows, number)
     of_dampers = _of_dampers, (lanes, springs, rows, rows, rows, rows, number)
-    return [*families, of_forces, of_dampers]
+    return [of_family, of_forces, of_dampers] if len(tile) == 1 else [of_family, of_forces]
 
 
 # These take the structures that they need and no others: a kernel takes seconds to compile that is handed them all.
 
 
 @njit(cache=True, error_model="numpy")
-def _of_family(tile: Tile, address: int, family: Any, z: Array, w: Array, block: Array, first: int) -> None:
-    """Run the kernel at an address, for the stiffness or the damping of a family."""
-    function_pointers.call(address, (tile, raw(family), pointer(z), pointer(w), pointer(block), first))
+def _of_family(
+    tile: Tile, address: int, family: Array, z: Array, w: Array, block: Array, first: int, viscous: bool
+) -> None:
+    """Run the kernel at an address for a family at its place, see `families.lay`."""
+    function_pointers.call(address, (tile, pointer(family), pointer(z), pointer(w), pointer(block), first, viscous))
 
 
 @njit(cache=True, error_model="numpy")

@@ -154,8 +154,12 @@ def required(scene: Scene, lanes: int, *, every: bool = False) -> list[KernelSig
     frame = framed(tile, scheme, arrays, room, 0.0, 0, np.zeros(1), model.marker_rows.ravel(), 0.0, stops)
     found = [(loop, (frame_type(frame),)), *signatures(tile, settings, arrays, room)]
     found += kernels.signatures(tile, arrays, room, every=every)
+    if not facts(name).explicit:
+        found.append(tangent.assembly(tile, arrays, room, tangent.tangent_tile(model, tile, lane)))
+    if every:  # limits of stability
+        found += tangent.signatures(tile, arrays, room)
     if every and tile == SINGLE:  # statics, modes and reactions
-        found += evaluations.signatures(tile, arrays, room) + tangent.signatures(tile, arrays, room)
+        found += evaluations.signatures(tile, arrays, room)
     named = [KernelSignature(kernel.__module__, kernel.__name__, kinds) for kernel, kinds in found]
     if lanes > 1 and not every:  # lanes mostly differ in their start alone, and share one stability limit
         named = [kernel for kernel in named if kernel.name != "_stiffness"]

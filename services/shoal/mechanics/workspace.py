@@ -11,6 +11,7 @@ import numpy as np
 from shoal.errors import InputError
 from shoal.mechanics import forces, states
 from shoal.mechanics.dynamics import Work, derived_rows, work_space
+from shoal.mechanics.elements.families import lay
 from shoal.mechanics.event_record import recorded
 from shoal.mechanics.halts import Halts
 from shoal.mechanics.integrators import Choice, choose, facts
@@ -95,7 +96,8 @@ class Workspace:
         if seek is None and facts(choice.name).sparse_constraints:
             room = lean(arrays, room)
         if spare:
-            arrays = arrays._replace(elements=tuple(family._replace(spare=spare) for family in arrays.elements))
+            elements = tuple(family._replace(spare=spare) for family in arrays.elements)
+            arrays = arrays._replace(elements=elements, families=lay(elements))
         settings = choose(solver, model, tile, part, choice.name)
         steps = solver.max_steps if facts(choice.name).adaptive else int(np.ceil(times[-1] / solver.step - 1e-9))
         rows = np.concatenate([model.marker_rows.ravel(), states.rows(model)]) if whole else model.marker_rows.ravel()

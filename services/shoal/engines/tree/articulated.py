@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from numba import njit
 
+from shoal.compile.tuples import dot, minus, plus, times, wedge
 from shoal.engines.tree.motion import move, third_axis
 from shoal.engines.tree.tree import PRISMATIC, REVOLUTE, SPHERICAL, Array, Room, Tree
 from shoal.engines.tree.vector3 import (
@@ -33,7 +34,6 @@ from shoal.engines.tree.vector3 import (
     symmetric,
     vector,
 )
-from shoal.mechanics.numerics.tuples import dot, minus, plus, times, wedge
 
 
 @njit(**OPTIONS)

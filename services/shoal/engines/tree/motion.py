@@ -10,6 +10,7 @@ import math
 
 from numba import njit
 
+from shoal.compile.tuples import dot, plus, times, wedge
 from shoal.engines.tree.tree import PRISMATIC, REVOLUTE, SPHERICAL, Array, Room, Tree
 from shoal.engines.tree.vector3 import (
     OPTIONS,
@@ -27,7 +28,6 @@ from shoal.engines.tree.vector3 import (
     symmetric,
     vector,
 )
-from shoal.mechanics.numerics.tuples import dot, plus, times, wedge
 
 
 @njit(**OPTIONS)

@@ -19,7 +19,7 @@ from shoal.mechanics import forces, functions, plane
 from shoal.mechanics.analysis import evaluations
 from shoal.mechanics.analysis.load_stiffness import driven, in_plane, in_space, of_drives
 from shoal.mechanics.dynamics import derived_rows, work_space
-from shoal.mechanics.elements.families import KERNELS
+from shoal.mechanics.elements.families import KERNELS, lay
 from shoal.mechanics.kernels import ready
 from shoal.mechanics.machine import Machine
 from shoal.mechanics.model import Arrays, Model
@@ -233,21 +233,22 @@ class Evaluator:
     def _only(self, body: str, number: int | None = None) -> Arrays:
         """The arrays with the stiffness of one element of a body (or of all of them), and with no loads."""
         arrays = self._arrays
-        families = []
+        elements = []
         for family, owners in zip(arrays.elements, self.model.owners, strict=True):
             kernel = KERNELS[type(family)]
             values = family.coefficients.reshape(-1, kernel.coefficients).copy()
             for row, owner in enumerate(owners):
                 if owner != body or number not in (None, row - owners.index(owner)):
                     values[row, kernel.first_stiffness :] = 0.0
-            families.append(family._replace(coefficients=values.ravel()))
+            elements.append(family._replace(coefficients=values.ravel()))
         law = np.zeros_like(arrays.forces.law)
         law[forces.SPEED :: forces.LAW] = 1.0
         none = np.full_like(arrays.forces.table, -1)
         applied = arrays.applied
         return self._changed(
             weight=0.0 * arrays.weight,
-            elements=tuple(families),
+            families=lay(tuple(elements)),
+            elements=tuple(elements),
             forces=arrays.forces._replace(law=law, table=none, energy=none),
             applied=applied._replace(coefficient=0.0 * applied.coefficient, factor=0.0 * applied.factor, share=0.0),
         )

@@ -17,7 +17,7 @@ from shoal.compile.structures import Reference
 from shoal.mechanics import constraints, dynamics, kernels
 from shoal.mechanics.derived import derive
 from shoal.mechanics.dynamics import Work
-from shoal.mechanics.model import Arrays
+from shoal.mechanics.model import Arrays, seen
 from shoal.mechanics.numerics.tile import Array, Tile
 
 _NOTHING = np.zeros(1)
@@ -26,7 +26,7 @@ _ADDRESSES: dict[tuple[Any, ...], int] = {}
 
 def enter(arrays: Arrays, room: Work) -> None:
     """Write both structures where kernels read them; at first, and whenever one of their arrays is another."""
-    structures.write(arrays.storage, arrays)
+    structures.write(arrays.storage, seen(arrays))
     structures.write(room.storage, room)
 
 
@@ -77,7 +77,9 @@ def follow_gaps(tile: Tile, arrays: Arrays, room: Work, q: Array, v: Array) -> t
 
 def signatures(tile: Tile, arrays: Arrays, room: Work) -> list[kernels.Kernel]:
     """Return the kernels of all evaluations of a model, with the types of their arguments."""
-    return [(kernel, _kinds(tile, arrays, room)) for kernel in (_look, _elastic, _accelerate, _stored, _remember)]
+    number, memory = types.float64, typeof(arrays.storage)
+    called = _call, (types.int64, typeof(tile), memory, memory, number, number, typeof(_NOTHING))
+    return [called, *((one, _kinds(tile, arrays, room)) for one in (_look, _elastic, _accelerate, _stored, _remember))]
 
 
 def _run(
@@ -89,7 +91,7 @@ def _run(
     tolerance: float = 0.0,
     out: Array = _NOTHING,
 ) -> None:
-    key = kernel.__name__, len(tile), len(arrays.space), *map(type, arrays.elements)
+    key = kernel.__name__, len(tile)
     if key not in _ADDRESSES:
         _ADDRESSES[key] = function_pointers.address(kernel, _kinds(tile, arrays, room))
     _call(_ADDRESSES[key], tile, arrays.storage, room.storage, float(t), tolerance, out)
@@ -97,7 +99,7 @@ def _run(
 
 def _kinds(tile: Tile, arrays: Arrays, room: Work) -> tuple[Any, ...]:
     number = types.float64
-    structure = (Reference(raw_type(typeof(part))) for part in (arrays, room))
+    structure = (Reference(raw_type(typeof(part))) for part in (seen(arrays), room))
     return typeof(tile), *structure, number, number, types.CPointer(number)
 
 

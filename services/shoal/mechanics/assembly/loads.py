@@ -153,8 +153,9 @@ class Measures:
         """Springs, dampers, friction and torques as arrays."""
         table, energy, drive = np.array(self.numbers, dtype=np.int64).reshape(-1, 3).T.copy()
         rows = index(self.places).ravel()
-        space = (0,) * self.scene.dimensions
-        return Forces(space, len(self.kinds), index(self.kinds), rows, table, energy, drive, stacked(self.laws))
+        return Forces(
+            self.scene.dimensions, len(self.kinds), index(self.kinds), rows, table, energy, drive, stacked(self.laws)
+        )
 
 
 class Loads(Measures):
@@ -325,7 +326,7 @@ class Loads(Measures):
         """Applied loads as arrays."""
         factors = [part for _, value, _ in self.following for part in value]
         return Applied(
-            (0,) * self.scene.dimensions,
+            self.scene.dimensions,
             len(self.fixed),
             index([row for row, _, _ in self.fixed]),
             stacked([part for _, part, _ in self.fixed]),

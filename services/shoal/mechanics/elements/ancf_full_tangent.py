@@ -154,7 +154,7 @@ def _add_block(
 
 
 @njit(cache=True, error_model="numpy")
-def stiffness(tile: Tile, family: Family, z: Array, w: Array, out: Array, first: int) -> None:
+def stiffness(tile: Tile, family: Family, z: Array, w: Array, out: Array, first: int, viscous: bool) -> None:
     """Stiffness d2U/dz2 of every element; rows of out from `first` on: (144 size, lanes), 12 x 12 blocks, row-major.
 
     w: work space of 64 rows. Pointers.

@@ -106,9 +106,7 @@ def _coordinate(tile, family, number, lane, side, k, z):  # type: ignore[no-unty
 @overload(kept, jit_options=_INLINE)
 def _kept(space, w, at, step):  # type: ignore[no-untyped-def]
     width = len(EIGHT)
-    if space.count == 1:
-        return lambda space, w, at, step: (simd.load(EIGHT, w, width * at),)
-    return lambda space, w, at, step: (simd.load(EIGHT, w, width * at), *kept(space[1:], w, at + step, step))
+    return lambda space, w, at, step: simd.loads(space, EIGHT, w, width * at, width * step)
 
 
 @overload(kept_matrix, jit_options=_INLINE)
@@ -133,33 +131,34 @@ def _zeros_like(a):  # type: ignore[no-untyped-def]
 
 @overload(rows, jit_options=_INLINE)
 def _rows(like, tile, family, number, lane, side, k, z):  # type: ignore[no-untyped-def]
-    if like.count == 1:
-        return lambda like, tile, family, number, lane, side, k, z: (
-            coordinate(tile, family, number, lane, side, k, z),
+    if tile.count == 1:
+        return lambda like, tile, family, number, lane, side, k, z: simd.picks(
+            like, EIGHT, z, family.rows, side * number + k, side, 1, 0
         )
-    return lambda like, tile, family, number, lane, side, k, z: (
-        coordinate(tile, family, number, lane, side, k, z),
-        *rows(like[1:], tile, family, number, lane, side, k + 1, z),
+    return lambda like, tile, family, number, lane, side, k, z: simd.loads_rows(
+        like, EIGHT, z, family.rows, side * number + k, lane, len(tile)
     )
 
 
 @overload(coefficients, jit_options=_INLINE)
 def _coefficients(like, tile, family, number, lane, count, k):  # type: ignore[no-untyped-def]
-    if like.count == 1:
-        return lambda like, tile, family, number, lane, count, k: (coefficient(tile, family, number, lane, count, k),)
-    return lambda like, tile, family, number, lane, count, k: (
-        coefficient(tile, family, number, lane, count, k),
-        *coefficients(like[1:], tile, family, number, lane, count, k + 1),
+    if tile.count == 1:
+        return lambda like, tile, family, number, lane, count, k: simd.gathers(
+            like, EIGHT, family.coefficients, count * number + k, count
+        )
+    return lambda like, tile, family, number, lane, count, k: simd.loads(
+        like, EIGHT, family.coefficients, (count * number + k) * len(tile) + lane, len(tile)
     )
 
 
 @overload(rests, jit_options=_INLINE)
 def _rests(like, tile, family, number, lane, k):  # type: ignore[no-untyped-def]
-    if like.count == 1:
-        return lambda like, tile, family, number, lane, k: (rest(tile, family, number, lane, k),)
-    return lambda like, tile, family, number, lane, k: (
-        rest(tile, family, number, lane, k),
-        *rests(like[1:], tile, family, number, lane, k + 1),
+    if tile.count == 1:
+        return lambda like, tile, family, number, lane, k: simd.picks(
+            like, EIGHT, shift(family.reference, k), family.plan, PLAN * number + REST, PLAN, 0, 1
+        )
+    return lambda like, tile, family, number, lane, k: simd.loads(
+        like, EIGHT, family.reference, (family.plan[PLAN * number + REST] + k) * len(tile) + lane, len(tile)
     )
 
 

@@ -19,12 +19,12 @@ from numba import njit
 
 from shoal.compile.pointers import shift
 from shoal.compile.simd import EIGHT, inverse_root, load, reciprocal, root, spread, store
+from shoal.compile.tuples import dot, facing, minus, outer, plus, plus_identity, plus_skew, times, wedge
 from shoal.mechanics.elements import beam
 from shoal.mechanics.elements.batch import add_sum, coefficient, kept, kept_matrix, nodal, put, together, zeros_like
-from shoal.mechanics.elements.families import PLAN, PLANE, Family, space_of
+from shoal.mechanics.elements.families import PLAN, PLANE, SPACE, Family, implement_tangent, space_of
 from shoal.mechanics.elements.strain import STRAIGHT, less, reference
 from shoal.mechanics.numerics.tile import Array, Tile
-from shoal.mechanics.numerics.tuples import dot, facing, minus, outer, plus, plus_identity, plus_skew, times, wedge
 
 _X, _FACTOR, _BLOCK = 1, 16, 22
 """Vectors of the work space: one of `batch`; scaled vectors; factors of nodal vectors; blocks (a_i, d_i) H (a_j, d_j),
@@ -238,12 +238,19 @@ def _blocks(tile: Tile, viscous: bool, family: Family, z: Array, w: Array, out: 
 
 
 @njit(cache=True, error_model="numpy")
-def stiffness(tile: Tile, family: Family, z: Array, w: Array, out: Array, first: int) -> None:
+def stiffness(tile: Tile, family: Family, z: Array, w: Array, out: Array, first: int, viscous: bool) -> None:
     """See `families.tangent`."""
-    _blocks(tile, False, family, z, w, out, first)
+    _blocks(tile, viscous, family, z, w, out, first)
 
 
-@njit(cache=True, error_model="numpy")
-def viscosity(tile: Tile, family: Family, z: Array, w: Array, out: Array, first: int) -> None:
-    """See `families.damping`."""
-    _blocks(tile, True, family, z, w, out, first)
+class PlanarBeams(Family):
+    """Beams in the plane, of any order: their tangent is compiled once."""
+
+
+class SpatialBeams(Family):
+    """The same in space."""
+
+
+TANGENTS = {PLANE: PlanarBeams, SPACE: SpatialBeams}
+for _space, _kind in TANGENTS.items():
+    implement_tangent(_kind, _space, stiffness)

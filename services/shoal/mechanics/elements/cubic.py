@@ -22,13 +22,13 @@ from numba import njit
 
 from shoal.compile.pointers import shift
 from shoal.compile.simd import EIGHT, inverse_root, reciprocal, spread
+from shoal.compile.tuples import dot, facing, minus, plus, times, wedge
 from shoal.errors import InputError
 from shoal.mechanics.elements import beam, beam_table
 from shoal.mechanics.elements.batch import VARIANT, add_rows, add_sum, coefficient, nodal, of_one_variant, zeros_like
 from shoal.mechanics.elements.families import PLAN, PLANE, SPACE, Entry, Family, Kernel, implement, space_of
 from shoal.mechanics.elements.strain import STRAIGHT, bend, less, reference
 from shoal.mechanics.numerics.tile import Array, Number, Tile
-from shoal.mechanics.numerics.tuples import dot, facing, minus, plus, times, wedge
 from shoal.scene import Rod
 from shoal.scene.sections import Section
 
@@ -335,11 +335,10 @@ def potential(tile: Tile, family: Family, z: Array, w: Array, energy: Array, row
 for _kind, _space in ((Cubics, PLANE), (SpatialCubics, SPACE)):
     implement(
         _kind,
-        Kernel(len(_space) * VECTORS, beam.COEFFICIENTS, 1, _space),
+        Kernel(len(_space) * VECTORS, beam.COEFFICIENTS, 1, _space, beam_table.TANGENTS[_space]),
         force=force,
         potential=potential,
         stiffness=beam_table.stiffness,
-        viscosity=beam_table.viscosity,
     )
 
 

@@ -25,6 +25,7 @@ from numba import njit
 
 from shoal.compile.pointers import pointer, shift
 from shoal.compile.simd import EIGHT, load, root, spread, store
+from shoal.compile.tuples import dot, minus, plus, times
 from shoal.mechanics.elements import beam
 from shoal.mechanics.elements.batch import (
     VARIANT,
@@ -44,7 +45,6 @@ from shoal.mechanics.elements.families import PLAN, Entry, Family, Kernel, imple
 from shoal.mechanics.elements.hermite import curve
 from shoal.mechanics.elements.unstrained import unstrained
 from shoal.mechanics.numerics.tile import Array, Number, Tile
-from shoal.mechanics.numerics.tuples import dot, minus, plus, times
 from shoal.scene import Rod
 from shoal.scene.sections import Section
 
@@ -139,7 +139,7 @@ def potential(tile: Tile, family: Family, z: Array, w: Array, energy: Array, row
 
 @njit(error_model="numpy", forceinline=True)
 def _columns(tile: Tile, viscous: bool, family: Family, z: Array, w: Array, out: Array, first: int) -> None:
-    """Column by column: differences of the force, or the damping force of a unit rate; viscous is a constant."""
+    """Column by column: differences of the force, or the damping force of a unit rate."""
     number = 0
     while number < family.size:
         count = together(tile, family, number)
@@ -176,15 +176,9 @@ def _columns(tile: Tile, viscous: bool, family: Family, z: Array, w: Array, out:
 
 
 @njit(cache=True, error_model="numpy")
-def stiffness(tile: Tile, family: Family, z: Array, w: Array, out: Array, first: int) -> None:
+def stiffness(tile: Tile, family: Family, z: Array, w: Array, out: Array, first: int, viscous: bool) -> None:
     """See `families.tangent`: differences of fourth order of the force; 1e-13 of the largest is left of round-off."""
-    _columns(tile, False, family, z, w, out, first)
-
-
-@njit(cache=True, error_model="numpy")
-def viscosity(tile: Tile, family: Family, z: Array, w: Array, out: Array, first: int) -> None:
-    """See `families.damping`."""
-    _columns(tile, True, family, z, w, out, first)
+    _columns(tile, viscous, family, z, w, out, first)
 
 
 implement(
@@ -193,7 +187,6 @@ implement(
     force=force,
     potential=potential,
     stiffness=stiffness,
-    viscosity=viscosity,
 )
 
 

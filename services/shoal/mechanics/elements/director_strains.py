@@ -11,10 +11,10 @@ import numpy as np
 from numba import njit
 
 from shoal.compile.simd import inverse_root, reciprocal
+from shoal.compile.tuples import dot, plus, times
+from shoal.compile.tuples import wedge as cross
 from shoal.mechanics.elements.hermite import collect, curve
 from shoal.mechanics.numerics.arc import arctangent, turn
-from shoal.mechanics.numerics.tuples import dot, plus, times
-from shoal.mechanics.numerics.tuples import wedge as cross
 
 STRAINS = 9
 AXIAL = np.array([[0.0, 1 / 6], [0.5, 4 / 6], [1.0, 1 / 6]])

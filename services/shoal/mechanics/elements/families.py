@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from shoal.compile import structures
 from shoal.compile.choice import choose
 from shoal.compile.simd import EIGHT
 from shoal.mechanics.numerics.tile import Array, Index, Number, Tile, index, stacked
@@ -47,13 +48,16 @@ class Family(NamedTuple):
 class Kernel(NamedTuple):
     """Sizes for one element: rows, coefficients, and the first of these that is a stiffness.
 
-    space: a tuple as long as its vectors are, of kernels that are written for both the plane and space.
+    space: a tuple as long as its vectors are, of kernels that are written for both the plane and space. tangent: the
+    family for which the tangent is compiled, where several share one. exact: whether `add_mean_force` knows the force.
     """
 
     side: int
     coefficients: int
     first_stiffness: int
     space: tuple[int, ...] = PLANE
+    tangent: type | None = None
+    exact: bool = False
 
 
 class Entry(NamedTuple):
@@ -125,12 +129,7 @@ def add_force(
 
 
 def add_mean_force(tile: Tile, family: Family, before: Array, after: Array, f: Array, w: Array) -> None:
-    """Add the force whose work over a step is exactly the loss of energy, of families that know it; else nothing."""
-    raise NotImplementedError(type(family).__name__)
-
-
-def is_exact(family: Family) -> bool:
-    """Return whether `add_mean_force` does anything."""
+    """Add the force whose work over a step is exactly the loss of energy, of families that know it. Pointers."""
     raise NotImplementedError(type(family).__name__)
 
 
@@ -139,13 +138,12 @@ def add_energy(tile: Tile, family: Family, z: Array, w: Array, energy: Array, ro
     raise NotImplementedError(type(family).__name__)
 
 
-def tangent(tile: Tile, family: Family, z: Array, w: Array, out: Array, first: int) -> None:
-    """Stiffness d2U/dz2 of every element; rows of out from `first` on: (size side^2, lanes), row-major blocks."""
-    raise NotImplementedError(type(family).__name__)
+def tangent(tile: Tile, family: Family, z: Array, w: Array, out: Array, first: int, viscous: bool) -> None:
+    """Stiffness d2U/dz2 of every element; rows of out from `first` on: (size side^2, lanes), row-major blocks.
 
-
-def damping(tile: Tile, family: Family, z: Array, w: Array, out: Array, first: int) -> None:
-    """Damping matrix -df/dzdot of every element [N s/m, ...], laid out as in `tangent`; zero on entry. Pointers."""
+    viscous: the damping matrix -df/dzdot [N s/m, ...] in place of it, of a damped family.
+    Pointers.
+    """
     raise NotImplementedError(type(family).__name__)
 
 
@@ -154,18 +152,37 @@ def space_of(family: Family) -> tuple[int, ...]:
     raise NotImplementedError(type(family).__name__)
 
 
-def implement(
-    kind: type, kernel: Kernel, *, force: Any, potential: Any, stiffness: Any, viscosity: Any = None, mean: Any = None
-) -> None:
+def implement(kind: type, kernel: Kernel, *, force: Any, potential: Any, stiffness: Any, mean: Any = None) -> None:
     """Let compiled calls with elements of this type run these kernels, whose parameters are named as above.
 
-    viscosity: of a family that may be damped. mean: of one that is exact.
+    mean: of one that is exact.
     """
-    KERNELS[kind] = kernel
-    choose(space_of, kind, (lambda family: PLANE) if kernel.space == PLANE else (lambda family: SPACE))
+    KERNELS[kind] = kernel._replace(exact=mean is not None)
+    _choose_space(kind, kernel.space)
     choose(add_force, kind, force, forceinline=True)
     choose(add_energy, kind, potential)
     choose(tangent, kind, stiffness)
-    choose(damping, kind, viscosity or (lambda tile, family, z, w, out, first: None))
-    choose(add_mean_force, kind, mean or (lambda tile, family, before, after, f, w: None))
-    choose(is_exact, kind, (lambda family: True) if mean else (lambda family: False))
+    if mean:
+        choose(add_mean_force, kind, mean)
+
+
+def implement_tangent(kind: type, space: tuple[int, ...], stiffness: Any) -> None:
+    """Let compiled calls of `tangent` with a type that several families share, `Kernel.tangent`, run this kernel."""
+    _choose_space(kind, space)
+    choose(tangent, kind, stiffness)
+
+
+def _choose_space(kind: type, space: tuple[int, ...]) -> None:
+    choose(space_of, kind, (lambda family: PLANE) if space == PLANE else (lambda family: SPACE))
+
+
+LAID = 16
+"""Room of one family in `lay`, in numbers of 8 bytes."""
+
+
+def lay(elements: tuple[Any, ...]) -> Array:
+    """Write families back to back, as kernels read them; their arrays must outlive the use."""
+    places = np.zeros((len(elements), LAID))
+    for place, family in zip(places, elements, strict=True):
+        structures.write(place, family)
+    return places.ravel()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from numba import njit
 
-from shoal.mechanics.numerics.tuples import plus, times
+from shoal.compile.tuples import plus, times
 
 
 @njit(error_model="numpy", forceinline=True)

@@ -11,12 +11,12 @@ import numpy as np
 from numba import njit
 
 from shoal.compile.simd import EIGHT, inverse_root, reciprocal, spread
+from shoal.compile.tuples import dot, facing, minus, plus, times, wedge
 from shoal.mechanics.elements import beam, beam_table
 from shoal.mechanics.elements.batch import VARIANT, add_rows, add_sum, coefficient, nodal, of_one_variant, zeros_like
 from shoal.mechanics.elements.families import PLAN, PLANE, SPACE, Entry, Family, Kernel, implement, space_of
 from shoal.mechanics.elements.strain import STRAIGHT, bend, reference, stretch
 from shoal.mechanics.numerics.tile import Array, Number, Tile
-from shoal.mechanics.numerics.tuples import dot, facing, minus, plus, times, wedge
 from shoal.scene import Rod
 from shoal.scene.sections import Section
 
@@ -219,11 +219,10 @@ def force(tile: Tile, family: Family, z: Array, zdot: Array, f: Array, w: Array,
 for _kind, _space in ((Quintics, PLANE), (SpatialQuintics, SPACE)):
     implement(
         _kind,
-        Kernel(len(_space) * VECTORS, beam.COEFFICIENTS, 1, _space),
+        Kernel(len(_space) * VECTORS, beam.COEFFICIENTS, 1, _space, beam_table.TANGENTS[_space]),
         force=force,
         potential=beam_table.potential,
         stiffness=beam_table.stiffness,
-        viscosity=beam_table.viscosity,
     )
 
 

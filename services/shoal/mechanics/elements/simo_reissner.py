@@ -21,6 +21,7 @@ from numba import njit
 
 from shoal.compile.pointers import shift
 from shoal.compile.simd import EIGHT, load, spread, store
+from shoal.compile.tuples import minus, plus, times
 from shoal.mechanics.elements import beam
 from shoal.mechanics.elements.batch import (
     VARIANT,
@@ -47,7 +48,6 @@ from shoal.mechanics.elements.simo_reissner_strains import (
     strains,
 )
 from shoal.mechanics.numerics.tile import Array, Number, Tile
-from shoal.mechanics.numerics.tuples import minus, plus, times
 from shoal.scene import Rod
 from shoal.scene.sections import Section
 
@@ -150,15 +150,9 @@ def _columns(tile: Tile, viscous: bool, family: Family, z: Array, w: Array, out:
 
 
 @njit(cache=True, error_model="numpy")
-def stiffness(tile: Tile, family: Family, z: Array, w: Array, out: Array, first: int) -> None:
+def stiffness(tile: Tile, family: Family, z: Array, w: Array, out: Array, first: int, viscous: bool) -> None:
     """See `families.tangent`."""
-    _columns(tile, False, family, z, w, out, first)
-
-
-@njit(cache=True, error_model="numpy")
-def viscosity(tile: Tile, family: Family, z: Array, w: Array, out: Array, first: int) -> None:
-    """See `families.damping`."""
-    _columns(tile, True, family, z, w, out, first)
+    _columns(tile, viscous, family, z, w, out, first)
 
 
 implement(
@@ -167,7 +161,6 @@ implement(
     force=force,
     potential=potential,
     stiffness=stiffness,
-    viscosity=viscosity,
 )
 
 

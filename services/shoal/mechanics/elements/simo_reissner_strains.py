@@ -17,9 +17,9 @@ import numpy as np
 from numba import njit
 
 from shoal.compile.simd import heaviside, inverse_root, reciprocal
+from shoal.compile.tuples import dot, plus, times
 from shoal.mechanics.elements.hermite import collect, curve
 from shoal.mechanics.numerics.arc import arctangent
-from shoal.mechanics.numerics.tuples import dot, plus, times
 
 STRAINS = 8
 """Stretch and shear of each point of Lobatto, then bending at both of Gauss."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from numba import njit
 
 from shoal.compile.simd import EIGHT, spread
+from shoal.compile.tuples import dot, minus, plus, times
 from shoal.mechanics.elements.batch import rest
-from shoal.mechanics.numerics.tuples import dot, minus, plus, times
 
 STRAIGHT = 1.5e-8
 """Curvature times length of an element, squared, at which half of a turn of its plane is damped: the root of eps."""

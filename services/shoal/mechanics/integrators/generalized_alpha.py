@@ -14,13 +14,12 @@ import numpy as np
 from numba import njit
 
 from shoal.compile.pointers import raw
-from shoal.mechanics import dynamics
+from shoal.mechanics import dynamics, kernels
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.integrators import guess, newton
 from shoal.mechanics.integrators.dense import cubic
 from shoal.mechanics.integrators.newton import Newton, newton_room
 from shoal.mechanics.integrators.scheme import Facts, implement
-from shoal.mechanics.least import drift
 from shoal.mechanics.model import Arrays, Model
 from shoal.mechanics.numerics.tile import Array, Tile
 from shoal.scene import Solver
@@ -84,7 +83,7 @@ def step(tile: Tile, scheme: GeneralizedAlpha, m: Arrays, w: Work, t: float, h: 
         for i in range(end):
             w.before[i] = w.zdot[i]
         now = dynamics.instant(w, t + h)
-        drift.project_rates(tile, m, w.gauss, now, w.z, w.zdot, scheme.newton.rank_tolerance)
+        kernels.project_rates(tile, m, w, now, scheme.newton.rank_tolerance)
         if m.driven:
             _count_impulse(tile, m, w, h)
     return h

@@ -25,7 +25,7 @@ from shoal.mechanics.integrators.guess import Guess, guess_room
 from shoal.mechanics.model import Arrays, Model
 from shoal.mechanics.numerics import sparse
 from shoal.mechanics.numerics.tile import Array, Tile
-from shoal.mechanics.tangent import Tangent, tangent_tile
+from shoal.mechanics.tangent import Tangent, assembled, tangent_tile
 from shoal.scene import Solver
 
 ITERATIONS = 30
@@ -76,7 +76,7 @@ class Newton(NamedTuple):
 def newton_room(solver: Solver, model: Model, tile: Tile, lanes: slice) -> Newton:
     """Settings and room for one tile of lanes."""
     width = len(tile)
-    tangent = tangent_tile(model, tile, lanes, held=True)
+    tangent = assembled(model, tile, lanes, tangent_tile(model, tile, lanes, held=True))
     held = max(1, model.constraints.size) * width
     return Newton(
         solver.newton_tolerance,

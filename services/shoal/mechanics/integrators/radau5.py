@@ -31,7 +31,7 @@ from shoal.mechanics.least import implicit
 from shoal.mechanics.model import Arrays, Model
 from shoal.mechanics.numerics import sparse
 from shoal.mechanics.numerics.tile import Array, Tile
-from shoal.mechanics.tangent import Tangent, tangent_tile
+from shoal.mechanics.tangent import Tangent, assembled, tangent_tile
 from shoal.scene import Solver
 
 ITERATIONS = 20
@@ -95,7 +95,7 @@ def settings(solver: Solver, model: Model, tile: Tile, lanes: slice) -> Radau5:
     is the solver's to the power 2/3, as in Hairer and Wanner's code.
     """
     width = len(tile)
-    tangent = tangent_tile(model, tile, lanes)
+    tangent = assembled(model, tile, lanes, tangent_tile(model, tile, lanes))
     inner = solver.model_copy(
         update={
             "relative_tolerance": 0.1 * solver.relative_tolerance ** (2 / 3),

@@ -22,7 +22,7 @@ from shoal.mechanics import kernels
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.integrators import dense
 from shoal.mechanics.kernels import Kernel
-from shoal.mechanics.model import Arrays
+from shoal.mechanics.model import Arrays, seen
 from shoal.mechanics.numerics.tile import Array, Tile
 
 
@@ -106,7 +106,7 @@ def connect(tile: Tile, settings: Any, arrays: Arrays, room: Work) -> Scheme:
     structures.write(storage, settings)
 
     def address(number: int) -> int:
-        key = len(tile), len(arrays.space), type(settings), number
+        key = len(tile), type(settings), number
         return kernels.address(key, lambda: signatures(tile, settings, arrays, room)[number])
 
     step, inside, forget = (address(k) if own[k] else 0 for k in range(3))
@@ -116,7 +116,7 @@ def connect(tile: Tile, settings: Any, arrays: Arrays, room: Work) -> Scheme:
 def signatures(tile: Tile, settings: Any, arrays: Arrays, room: Work) -> list[Kernel]:
     """Return the kernels of an integrator with the types of their arguments: the step, the motion inside, `forget`."""
     own = IMPLEMENTATIONS[type(settings)]
-    scheme, m, w = (Reference(raw_type(typeof(part))) for part in (settings, arrays, room))
+    scheme, m, w = (Reference(raw_type(typeof(part))) for part in (settings, seen(arrays), room))
     number, rows, lanes = types.float64, types.CPointer(types.float64), typeof(tile)
     # What interpolates between states alone looks at no settings, and is the same for all.
     whose = rows if own.inside.py_func.__module__ == dense.__name__ else scheme

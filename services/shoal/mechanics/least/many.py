@@ -195,5 +195,6 @@ def _is_independent(rank: int, rows: Array, moves: Array, least: float) -> bool:
     """Take the rows before number `rank` out of its move; return whether more than the least is left of it along it."""
     for r in range(rank):
         part = dot(rows[r], moves[rank]) / dot(rows[r], moves[r])
-        moves[rank] -= part * moves[r]
+        for i in range(moves.shape[1]):
+            moves[rank, i] -= part * moves[r, i]
     return dot(rows[rank], moves[rank]) > least  # type: ignore[no-any-return]

@@ -62,6 +62,10 @@ def spread_inverse(matrix: Array, components: int) -> Array:
     return columns.ravel()
 
 
+_TWO, _THREE = (0,) * 2, (0,) * 3
+"""Tuples as long as vectors are in the plane and in space."""
+
+
 def _side_by_side(tile: Tile, space: tuple[int, ...]) -> Tile:
     """The tile whose lanes are the components of those of another one."""
     return tile * len(space)
@@ -73,52 +77,33 @@ def _choose(tile, space):  # type: ignore[no-untyped-def]
     return lambda tile, space: wide
 
 
-def _divides(space: tuple[int, ...]) -> bool:
-    """Return whether vectors of the processor hold whole vectors of the space."""
-    return len(EIGHT) % len(space) == 0
-
-
-@overload(_divides)
-def _choose_divides(space):  # type: ignore[no-untyped-def]
-    whole = len(EIGHT) % space.count == 0
-    return lambda space: whole
-
-
-def _group(space: tuple[int, ...]) -> tuple[int, ...]:
-    """The space if vectors of the processor hold whole vectors of it, else what is never used."""
-    return space if _divides(space) else (0,)
-
-
-@overload(_group)
-def _choose_group(space):  # type: ignore[no-untyped-def]
-    group = (0,) * (space.count if len(EIGHT) % space.count == 0 else 1)
-    return lambda space: group
-
-
 @njit(cache=True, error_model="numpy", forceinline=True)
-def solve(tile: Tile, space: tuple[int, ...], alike: Alike, w: Array, x: Array) -> None:
+def solve(tile: Tile, alike: Alike, w: Array, x: Array) -> None:
     """Replace the right-hand side in x by the solution; w: room for twice the rows of the inverse. Pointers."""
-    if len(tile) == 1 and alike.pattern.size <= FEW and (alike.components == 1 or _divides(space)):
+    single = len(tile) == 1
+    if single and alike.pattern.size <= FEW and alike.components < 3:
         if alike.components == 1:
             _multiply_inverse((0,), alike, w, x)
         else:
-            _multiply_inverse(_group(space), alike, w, x)
-    elif alike.components == 1:
-        row_pairs.solve(tile, alike.factor, x, len(tile))
-    elif len(tile) == 1 or _divides(space):
-        row_pairs.solve(_side_by_side(tile, space), alike.factor, x, len(space) * len(tile))
+            _multiply_inverse(_TWO, alike, w, x)
+    elif alike.components == 2:
+        row_pairs.solve(_side_by_side(tile, _TWO), alike.factor, x, 2 * len(tile))
+    elif alike.components == 3 and single:
+        row_pairs.solve(_THREE, alike.factor, x, 3)
     else:
         # Vectors whose length is no power of two are filled up by the compiler, at several times the cost.
-        row_pairs.solve(tile, alike.factor, x, len(space) * len(tile))
+        row_pairs.solve(tile, alike.factor, x, alike.components * len(tile))
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def multiply(tile: Tile, space: tuple[int, ...], alike: Alike, x: Array, y: Array) -> None:
+def multiply(tile: Tile, alike: Alike, x: Array, y: Array) -> None:
     """y = M x. Pointers."""
     if alike.components == 1:
         _multiply(tile, alike, x, y)
+    elif alike.components == 2:
+        _multiply(_side_by_side(tile, _TWO), alike, x, y)
     else:
-        _multiply(_side_by_side(tile, space), alike, x, y)
+        _multiply(_side_by_side(tile, _THREE), alike, x, y)
 
 
 @njit(cache=True, error_model="numpy")
