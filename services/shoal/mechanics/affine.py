@@ -62,9 +62,9 @@ class Affine:
     @cached_property
     def own(self) -> tuple[int, ...] | None:
         """The d unknowns that are the components of this vector, if it is just that."""
-        axes = np.eye(len(self.constant))[..., None]
-        if len(self.terms) != len(axes) or not is_zero(self.constant):
+        if len(self.terms) != len(self.constant) or not is_zero(self.constant):
             return None
+        axes = np.eye(len(self.constant))[..., None]
         same = all(np.all(c == axis) for c, axis in zip(self.terms.values(), axes, strict=True))
         return tuple(self.terms) if same else None
 

@@ -30,7 +30,7 @@ from shoal.mechanics.independent import independent_rows
 from shoal.mechanics.numerics import alike, sparse
 from shoal.mechanics.numerics.alike import Alike
 from shoal.mechanics.numerics.row_pairs import paired
-from shoal.mechanics.numerics.tile import SINGLE, Array, Flags, Index, Tile, pack, packed, varies
+from shoal.mechanics.numerics.tile import SINGLE, Array, Flags, Index, Tile, pack, packed, stacked, varies
 from shoal.mechanics.rubbing import Rubbing
 from shoal.mechanics.saddle import Saddle
 from shoal.scene import Scene
@@ -339,7 +339,7 @@ def _equal(one: Any, other: Any) -> bool:
     if isinstance(one, tuple) and isinstance(other, tuple):
         return len(one) == len(other) and all(map(_equal, one, other))
     if isinstance(one, dict) and isinstance(other, dict):  # entries of a matrix
-        return one.keys() == other.keys() and all(np.all(value == other[key]) for key, value in one.items())
+        return one.keys() == other.keys() and _equal(*(stacked([each[key] for key in one]) for each in (one, other)))
     return bool(one == other)
 
 

@@ -21,6 +21,8 @@ CROSS = QUARTER.T
 
 def vector(*components: Number) -> Array:
     """The vector of these components, (d, lanes)."""
+    if all(type(one) is float for one in components):
+        return np.array(components)[:, None]
     return np.stack(np.broadcast_arrays(*(np.atleast_1d(np.asarray(one, dtype=float)) for one in components)))
 
 

@@ -179,7 +179,7 @@ def element(
     """A beam element as `Element` states it; space: a tuple as long as its nodal vectors."""
 
     def nodal_vectors(rod: Rod, s: Number) -> list[Number]:
-        return [_padded(vector, space) for vector in (tangent(rod, s), _normal(rod, s))][: vectors // 2 - 1]
+        return [_padded(vector(rod, s), space) for vector in (tangent, _normal)[: vectors // 2 - 1]]
 
     return Element(
         family=family,

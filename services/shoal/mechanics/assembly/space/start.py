@@ -156,6 +156,8 @@ class _Start:
         """
         scene = self.scene
         rigid = [name for name, j in scene.joints.items() if all(is_stiff(scene, side.body) for side in places(j))]
+        if not rigid:
+            return np.zeros(1)
         rows = Closure(scene, begin, bodies=self._bodies).rows(begin)
         gaps = np.abs(rows.gap / np.where(rows.angular, 1.0, self.size)) * np.isin(rows.names, rigid)
         found = np.asarray(np.max(gaps, axis=1, initial=0.0))
