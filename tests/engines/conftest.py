@@ -416,6 +416,15 @@ ONLY_NATIVE = [
         initial={"A": {"position": [0.6, -0.8], "velocity": [0.0, 0.0]}},
     ),
     pendulum("stopped", joints={"O": PIN["O"] | {"stops": {"min": -4.0, "restitution": 0.5}}}),
+    pendulum("sticking", joints={"O": PIN["O"] | {"coulomb": 0.1, "stick": "exact"}}),
+    scene(
+        "bouncing",
+        {"A": {"kind": "point-mass", "mass": 1.0}},
+        {},
+        {"A": at("A")},
+        contacts={"floor": {"first": at("A"), "second": GROUND | {"line": 0.0}, "restitution": 0.5, "mu": 0.3}},
+        initial={"A": {"position": [0.0, 0.8], "velocity": [1.0, 0.0]}},
+    ),
     scene(
         "hose",
         {"A": {"kind": "point-mass", "mass": 1.0}},

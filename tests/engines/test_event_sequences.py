@@ -81,28 +81,28 @@ def balls(late: float, kept: float = 0.5) -> Scene:
         "loads": {f"spring-{name}": spring | {"second": {"body": name}} for name in "ab"},
         "markers": {name: {"body": name} for name in places},
         "initial": {name: {"position": places[name], "velocity": [rates[name], 0.0]} for name in places},
-        "solver": {"duration": 0.5},
+        "solver": {"duration": 0.5, "relative_tolerance": 1e-9},
     })  # fmt: skip
 
 
 def test_impacts_whose_order_is_not_known_are_rejected_as_the_other_order_ends_elsewhere() -> None:
-    run = shoal.simulate(balls(1e-12))
+    run = shoal.simulate(balls(1e-11))
     assert str(run.status[0]) == "failed"
     assert [one.code for one in run.findings] == ["open-contacts", "order-of-impacts-not-resolved"]
     (first, *_) = run.model["verification"]["undecided"]
     assert first["joints"] == ["a", "b"]
-    assert first["margin"] < first["error"] < 1e-11
+    assert first["margin"] < first["error"] < 1e-8
     # The other order is the mirror image.
     m, a, b = (run.marker(name)[-1, 0] for name in "mab")
     assert first["distance"] == pytest.approx(max(abs(2 * m), abs(a + b)), rel=1e-3)
 
 
 def test_an_order_that_is_known_or_does_not_matter_is_no_doubt() -> None:
-    known = shoal.simulate(balls(1e-8))
+    known = shoal.simulate(balls(1e-6))
     assert known.ok
     assert not known.findings
     # Of equal balls that lose nothing every order ends alike.
-    equal = shoal.simulate(balls(1e-12, 1.0))
+    equal = shoal.simulate(balls(1e-11, 1.0))
     assert equal.ok
     assert not equal.findings
     assert equal.model["verification"]["undecided"]

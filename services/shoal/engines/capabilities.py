@@ -35,6 +35,8 @@ FEATURES = (
     "damped rods in space",
     "stops",
     "one-sided distances",
+    "exact stick",
+    "contacts",
 )
 _FIELDS = {
     "coulomb": "dry friction",
@@ -80,6 +82,8 @@ def needs(scene: Scene) -> Iterator[tuple[str, str]]:
         if not isinstance(joint, Coupling) and joint.first.body == joint.second.body:
             yield f"joints.{name}", "closed rods"
     yield from ((f"joints.{name}", "closed loops") for name in loops(scene))
+    for name in scene.contacts:
+        yield f"contacts.{name}", "contacts"
     for name, load in scene.loads.items():
         yield from _item(f"loads.{name}", load)
 
@@ -90,6 +94,8 @@ def _item(where: str, item: Joint | Load) -> Iterator[tuple[str, str]]:
     for field, value in item:
         if field == "keeps" and value != "exactly":
             yield f"{where}.keeps", "one-sided distances"
+        if field == "stick" and value == "exact":
+            yield f"{where}.stick", "exact stick"
         if field in _FIELDS and value:
             yield f"{where}.{field}", _FIELDS[field]
         if isinstance(value, Function) and (value.number is None or field == "elastic"):

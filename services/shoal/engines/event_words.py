@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from shoal.mechanics.event_record import place_of
 from shoal.trajectory import Array
 
 Event = Mapping[str, Any]
-"""An event of `Trajectory.model["events"]`: time [s], joint, kind."""
+"""An event of `Trajectory.model["events"]`: time [s], joint or contact, kind."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,7 @@ class EventComparison:
     def text(self) -> str:
         """Return the difference in one clause; empty of equal words."""
         described = (
-            "no more" if event is None else f"{event['joint']} {event['kind']} at t = {event['time']:.9g} s"
+            "no more" if event is None else f"{place_of(event)} {event['kind']} at t = {event['time']:.9g} s"
             for event in self.differs
         )  # fmt: skip
         return " against ".join(described)
@@ -75,7 +76,7 @@ def compare(one: Sequence[Event], other: Sequence[Event], factor: float = 1.0) -
 
 def letter(event: Event) -> tuple[str, str]:
     """Return what of an event words are made of."""
-    return event["kind"], event["joint"]
+    return event["kind"], place_of(event)
 
 
 def _last_hop(events: Sequence[Event], first: int, rest: Event) -> int | None:
@@ -85,6 +86,6 @@ def _last_hop(events: Sequence[Event], first: int, rest: Event) -> int | None:
     for k in range(first, len(events)):
         if letter(events[k]) == letter(rest):
             return k
-        if letter(events[k]) != ("impact", rest["joint"]):
+        if letter(events[k]) != ("impact", place_of(rest)):
             return None
     return None

@@ -17,6 +17,7 @@ import numpy as np
 
 from shoal.engines.deviation import Deviation
 from shoal.engines.event_words import Event
+from shoal.mechanics.event_record import place_of
 from shoal.mechanics.gap_history import GapHistory, event_times, follow, instants
 from shoal.trajectory import Array
 
@@ -79,7 +80,7 @@ def undecided(deviation: Deviation) -> list[Undecided] | None:
         if each.time <= parting.until:
             first.setdefault((each.what, tuple(each.shift)), each)
     if not first and parting.differs:
-        concerned = {event["joint"] for event in parting.differs if event is not None}
+        concerned = {place_of(event) for event in parting.differs if event is not None}
         about = sorted((one for one in found if concerned & {*one.joints}), key=lambda one: one.time)
         return about[:1]
     return list(first.values())
@@ -88,7 +89,7 @@ def undecided(deviation: Deviation) -> list[Undecided] | None:
 def _grazes(history: GapHistory, events: Sequence[Event], error: Array) -> Iterator[Undecided]:
     """Yield near misses and light touches that are within the error of a gap."""
     for gap, joint in enumerate(history.joints):
-        own = np.unique([event["time"] for event in events if event["joint"] == joint])
+        own = np.unique([event["time"] for event in events if place_of(event) == joint])
         for time, margin in zip(*history.nearest(gap), strict=True):
             known = float(error[np.searchsorted(history.times, time), gap])
             if margin <= known:
@@ -107,7 +108,7 @@ def _orders(history: GapHistory, events: Sequence[Event], error: Array) -> Itera
     """Yield neighbouring impacts of two gaps whose order is not known."""
     impacts = [event for event in events if event["kind"] == "impact"]
     for one, other in pairwise(impacts):
-        if one["joint"] == other["joint"]:
+        if place_of(one) == place_of(other):
             continue
         first, second = (_hit(history, event, error) for event in (one, other))
         if first is None or second is None:
@@ -115,14 +116,14 @@ def _orders(history: GapHistory, events: Sequence[Event], error: Array) -> Itera
         margin, doubt = other["time"] - one["time"], first[2] / first[1] + second[2] / second[1]
         if margin <= doubt:
             gap, rate, _ = first
-            joints, what = (one["joint"], other["joint"]), ORDER if margin else TOGETHER
+            joints, what = (place_of(one), place_of(other)), ORDER if margin else TOGETHER
             yield Undecided(what, joints, one["time"], margin, doubt, {gap: -rate * (margin + doubt)})
 
 
 def _hit(history: GapHistory, event: Event, error: Array) -> tuple[int, float, float] | None:
     """Return the gap that an impact closes, the speed at which it does, and the error of the gap there."""
     k = int(np.searchsorted(history.times, event["time"]))
-    own = (gap for gap, joint in enumerate(history.joints) if joint == event["joint"])
+    own = (gap for gap, joint in enumerate(history.joints) if joint == place_of(event))
     falling = [gap for gap in own if history.rate[k, gap] < 0.0]
     if not falling:
         return None

@@ -11,8 +11,9 @@ import numpy as np
 from numba import njit
 
 from shoal.mechanics import kernels
-from shoal.mechanics.contact import HIT, LIFT
+from shoal.mechanics.contact.decision import HIT, LIFT, SLIDE, STOP
 from shoal.mechanics.dynamics import Work
+from shoal.mechanics.gaps import DRY, SLIP
 from shoal.mechanics.integrators.scheme import Scheme, interpolate
 from shoal.mechanics.marched import LoopRoom
 from shoal.mechanics.model import Arrays
@@ -22,24 +23,71 @@ PARTS = 8
 """Parts of a step that are judged by their ends."""
 NEVER = 2.0
 ITERATIONS = 60
-"""Of a root by halving and false position, by which it is known to round-off."""
-VALUE, RATE, FORCE = range(3)
+"""At most so many of a root; halving alone would know it to round-off."""
+FRACTION = 1e-15
+"""Width of a bracket, as a part of the step, that is a root."""
+VALUE, RATE, FORCE, MARGIN = range(4)
 TOUCHING = 1e3
 """A start that leaves less of a gap, in units of its resolution, closes it."""
 
 
 @njit(cache=True, error_model="numpy")
 def begin(tile: Tile, m: Arrays, w: Work) -> None:
-    """Keep gaps, rates and forces at the beginning of a step."""
+    """Keep gaps, rates, forces and margins at the beginning of a step."""
     kernels.look(tile, m, w, w.z, w.zdot)
-    _shift(tile, m, w)
+    shift(tile, m, w)
 
 
 @njit(cache=True, error_model="numpy")
-def _shift(tile: Tile, m: Arrays, w: Work) -> None:
+def shift(tile: Tile, m: Arrays, w: Work) -> None:
+    """Let what was looked at last be that at the beginning of a step."""
+    width = len(tile)
+    count = m.gaps.size * width
+    for at in range(count):
+        for what in range(4):
+            w.gaps.before[what * count + at] = _read(m, w, width, at, what)
+        # A slip that has just begun is none but for round-off.
+        if w.gaps.mode[at] == SLIP:
+            w.gaps.before[MARGIN * count + at] = max(w.gaps.before[MARGIN * count + at], 0.0)
+
+
+@njit(cache=True, error_model="numpy")
+def approach(tile: Tile, m: Arrays, w: Work, taken: float) -> bool:
+    """Mark the lanes of a tile of several in which a contact is closed or could close; return whether all are marked.
+
+    A tile takes common steps, which the events of each lane would cut; taken: length of the last step [s]
+    """
+    g, width = w.gaps, len(tile)
+    count, free = m.gaps.size * width, False
+    kernels.look(tile, m, w, w.z, w.zdot)
+    for at in range(count):
+        reach = 2.0 * taken * max(abs(g.before[RATE * count + at]), abs(g.rate[at]))
+        if m.gaps.kind[at // width] == DRY or not min(g.before[at], g.value[at]) > reach:
+            g.alone[at % width] = 1.0
+        g.before[at], g.before[RATE * count + at] = g.value[at], g.rate[at]
+    for lane in range(width):
+        free = free or g.alone[lane] == 0.0
+    return not free
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _read(m: Arrays, w: Work, width: int, at: int, what: int) -> float:
     g = w.gaps
-    for at in range(m.gaps.size * len(tile)):
-        g.value_before[at], g.rate_before[at], g.force_before[at] = g.value[at], g.rate[at], g.force[at]
+    if what == FORCE:
+        return g.force[at // width * (1 + m.gaps.tangents) * width + at % width]  # type: ignore[no-any-return]
+    return g.value[at] if what == VALUE else (g.rate[at] if what == RATE else g.margin[at])  # type: ignore[no-any-return]
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _pulls(m: Arrays, w: Work, width: int, at: int) -> bool:
+    """Return whether the force of a closed contact is negative."""
+    return m.gaps.kind[at // width] != DRY and _read(m, w, width, at, FORCE) < 0.0  # type: ignore[no-any-return]
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _turns(m: Arrays, w: Work, width: int, at: int) -> bool:
+    """Return whether friction of a closed contact is beyond its limit, or its slip has turned back."""
+    return m.gaps.rubs[at // width] > 0 and w.gaps.mode[at] != 0.0 and w.gaps.margin[at] < 0.0  # type: ignore[no-any-return]
 
 
 @njit(cache=True, error_model="numpy")
@@ -50,35 +98,39 @@ def first(
 
     t: beginning of the step [s]; taken: its length
     """
-    g, count = w.gaps, m.gaps.size * len(tile)
+    g, width = w.gaps, len(tile)
+    count = m.gaps.size * width
     kernels.look(tile, m, w, w.z, w.zdot)
     near, holding = False, False
     for at in range(count):
         g.hit[at] = 0.0
         if g.closed[at] != 0.0:
-            holding, near = True, near or g.force[at] < 0.0
+            holding = holding or _pulls(m, w, width, at) or _turns(m, w, width, at)
         else:
-            reach = 2.0 * taken * max(abs(g.rate_before[at]), abs(g.rate[at]))
-            near = near or min(g.value_before[at], g.value[at]) < reach
-    if not near:
+            reach = 2.0 * taken * max(abs(g.before[RATE * count + at]), abs(g.rate[at]))
+            near = near or min(g.before[at], g.value[at]) < reach
+    if not (near or holding):
         return NEVER
     for part in range(PARTS):
         left, right = part / PARTS, (part + 1) / PARTS
         _at(tile, scheme, m, w, k, t, right, taken, tolerance, holding)
         found = NEVER
         for at in range(count):
+            happens = False
             if g.closed[at] != 0.0:
-                happens = g.force_before[at] >= 0.0 and g.force[at] < 0.0
+                if holding:
+                    happens = g.before[FORCE * count + at] >= 0.0 and _pulls(m, w, width, at)
+                    happens = happens or (g.before[MARGIN * count + at] >= 0.0 and _turns(m, w, width, at))
             else:
-                dips = g.rate_before[at] < 0.0 and g.rate[at] > 0.0
+                dips = g.before[RATE * count + at] < 0.0 and g.rate[at] > 0.0
                 happens = g.value[at] < -m.gaps.resolution or dips
             g.hit[at] = 1.0 if happens else 0.0
-        if holding or _any(count, g.hit):
+        if _any(count, g.hit):
             found = _earliest(tile, scheme, m, w, k, t, left, right, taken, tolerance, holding)
-        if found <= 1.0:
-            return found
-        _at(tile, scheme, m, w, k, t, right, taken, tolerance, holding)
-        _shift(tile, m, w)
+            if found <= 1.0:
+                return found
+            _at(tile, scheme, m, w, k, t, right, taken, tolerance, holding)
+        shift(tile, m, w)
     return NEVER
 
 
@@ -96,28 +148,35 @@ def _earliest(
     tolerance: float, holding: bool,
 ) -> float:  # fmt: skip
     """Return the first root between two fractions of those that are marked, and leave the marks of its gaps alone."""
-    g, count, found = w.gaps, m.gaps.size * len(tile), NEVER
-    where = np.full(count, NEVER)
+    g, width, found = w.gaps, len(tile), NEVER
+    count = m.gaps.size * width
+    where, about = np.full(count, NEVER), np.zeros(count)
     for at in range(count):
         if g.hit[at] == 0.0:
             continue
         arguments = (tile, scheme, m, w, k, t)
         if g.closed[at] != 0.0:
-            where[at] = _root(*arguments, left, right, taken, tolerance, holding, at, FORCE)
+            _at(tile, scheme, m, w, k, t, right, taken, tolerance, holding)
+            pulls, turns = _pulls(m, w, width, at), _turns(m, w, width, at)
+            if pulls and g.before[FORCE * count + at] >= 0.0:
+                where[at], about[at] = _root(*arguments, left, right, taken, tolerance, holding, at, FORCE), LIFT
+            if turns and g.before[MARGIN * count + at] >= 0.0:
+                turn = _root(*arguments, left, right, taken, tolerance, holding, at, MARGIN)
+                if turn < where[at]:
+                    where[at], about[at] = turn, STOP if g.mode[at] == SLIP else SLIDE
         else:
             start, end = left, right
-            if g.rate_before[at] >= 0.0 and g.value_before[at] <= m.gaps.resolution:
+            if g.before[RATE * count + at] >= 0.0 and g.before[at] <= m.gaps.resolution:
                 start = _root(*arguments, left, right, taken, tolerance, holding, at, RATE)
             _at(tile, scheme, m, w, k, t, right, taken, tolerance, holding)
             if g.value[at] >= -m.gaps.resolution:
                 end = _root(*arguments, left, right, taken, tolerance, holding, at, RATE)
                 _at(tile, scheme, m, w, k, t, end, taken, tolerance, holding)
             if g.value[at] < -m.gaps.resolution:
-                where[at] = _root(*arguments, start, end, taken, tolerance, holding, at, VALUE)
+                where[at], about[at] = _root(*arguments, start, end, taken, tolerance, holding, at, VALUE), HIT
         found = min(found, where[at])
     for at in range(count):
-        here = where[at] <= found and found <= 1.0
-        g.hit[at] = (LIFT if g.closed[at] != 0.0 else HIT) if here else 0.0
+        g.hit[at] = about[at] if where[at] <= found and found <= 1.0 else 0.0
     return found
 
 
@@ -126,37 +185,33 @@ def _root(
     tile: Tile, scheme: Scheme, m: Arrays, w: Work, k: LoopRoom, t: float, left: float, right: float, taken: float,
     tolerance: float, holding: bool, at: int, what: int,
 ) -> float:  # fmt: skip
-    """Return the fraction at which a quantity of one gap changes its sign between two (Illinois method)."""
+    """Return the fraction at which a quantity of one contact changes its sign between two (Chandrupatla 1997)."""
+    width = len(tile)
     _at(tile, scheme, m, w, k, t, left, taken, tolerance, holding)
-    low = _read(w, at, what)
+    a, b, fb = right, left, _read(m, w, width, at, what)
     _at(tile, scheme, m, w, k, t, right, taken, tolerance, holding)
-    high, side = _read(w, at, what), 0
-    if not low * high < 0.0:
+    fa = _read(m, w, width, at, what)
+    if not fa * fb < 0.0:
         return right
-    best, least = right, abs(high)
-    for number in range(ITERATIONS):
-        middle = (low * right - high * left) / (low - high) if number % 3 != 2 else 0.5 * (left + right)
-        if not (left < middle and middle < right):
+    part = fa / (fa - fb)
+    for _ in range(ITERATIONS):
+        x = a + part * (b - a)
+        _at(tile, scheme, m, w, k, t, x, taken, tolerance, holding)
+        f, c, fc = _read(m, w, width, at, what), a, fa
+        if f * fa <= 0.0:
+            c, fc, b, fb = b, fb, a, fa
+        a, fa = x, f
+        if fa == 0.0:
+            return a
+        least = FRACTION / abs(b - a)
+        if least > 0.5:
             break
-        _at(tile, scheme, m, w, k, t, middle, taken, tolerance, holding)
-        value = _read(w, at, what)
-        if abs(value) < least:
-            best, least = middle, abs(value)
-        if value == 0.0:
-            break
-        if value * high < 0.0:
-            left, low, high = middle, value, 0.5 * high if side < 0 else high
-            side = -1
-        else:
-            right, high, low = middle, value, 0.5 * low if side > 0 else low
-            side = 1
-    return best
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def _read(w: Work, at: int, what: int) -> float:
-    g = w.gaps
-    return g.value[at] if what == VALUE else (g.rate[at] if what == RATE else g.force[at])  # type: ignore[no-any-return]
+        # Inverse quadratic interpolation where it is safe, else halving.
+        xi, phi, part = (a - b) / (c - b), (fa - fb) / (fc - fb), 0.5
+        if phi * phi < xi and (1.0 - phi) ** 2 < 1.0 - xi:
+            part = fa / (fb - fa) * fc / (fb - fc) + (c - a) / (b - a) * fa / (fc - fa) * fb / (fc - fb)
+        part = min(max(part, least), 1.0 - least)
+    return a if abs(fa) < abs(fb) else b
 
 
 @njit(cache=True, error_model="numpy")
@@ -189,6 +244,8 @@ def touching(tile: Tile, m: Arrays, w: Work) -> float:
     g, found = w.gaps, 0.0
     kernels.look(tile, m, w, w.z, w.zdot)
     for at in range(m.gaps.size * len(tile)):
-        if g.value[at] <= TOUCHING * m.gaps.resolution and g.rate[at] <= 0.0:
+        if m.gaps.kind[at // len(tile)] == DRY:
+            g.hit[at], g.closed[at], found = HIT, 1.0, 1.0
+        elif g.value[at] <= TOUCHING * m.gaps.resolution and g.rate[at] <= 0.0:
             g.hit[at], found = HIT, 1.0
     return found

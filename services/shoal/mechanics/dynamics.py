@@ -85,7 +85,7 @@ def work_space(tile: Tile, m: Arrays) -> Work:
         np.full(1, np.inf),
         least.work_space(width, m),
         rubbing.room(width, m.rows, m.rubbing.size),
-        gaps.room(width, m.gaps.size, m.unknowns, m.rows, m.constraints.size),
+        gaps.room(width, m.gaps, m.unknowns, m.rows, m.constraints.size),
     )
 
 
@@ -108,9 +108,14 @@ def _derived_rows(tile: Tile, derived: Derived, z: Array, begin: int, end: int, 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def loaded(m: Arrays) -> bool:
-    """Return whether forces depend on rates or on time."""
+    """Return whether forces depend on rates or on time, so that they take up or supply power."""
     a = m.applied
-    return m.driven or m.forces.size + a.fixed + a.following + a.turning + a.twisting > 0 or m.damped
+    return (
+        m.driven
+        or m.forces.size + a.fixed + a.following + a.turning + a.twisting > 0
+        or m.damped
+        or m.gaps.tangents > 0
+    )
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -185,7 +190,7 @@ def accelerate(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, 
         function_pointers.call(m.table.constrain, (tile, *arguments))
     else:
         solve(tile, m, w, a)
-        if m.gaps.size > 0:
+        if m.gaps.size > 0 and len(tile) == 1:
             function_pointers.call(m.table.contact, (tile, m, w, t, z, zdot, tolerance, a))
 
 
@@ -206,7 +211,7 @@ def constrain(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, t
         function_pointers.call_back(m.table.sought, t, a)
     else:
         _constrain(tile, m, w, t, z, zdot, tolerance, a)
-    if m.gaps.size > 0:
+    if m.gaps.size > 0 and len(tile) == 1:
         function_pointers.call(m.table.contact, (tile, m, w, t, z, zdot, tolerance, a))
     if m.driven:
         constraints.add_power(tile, m.constraints, m.functions, t, w.gauss.multiplier, w.power)

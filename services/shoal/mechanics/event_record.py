@@ -2,45 +2,54 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+from shoal.mechanics.contact.decision import HIT, KINDS, LIFT
 from shoal.mechanics.numerics.tile import Array
 
 LAST = 3
 """Impacts whose times give the limit of a geometric sequence (Aitken's delta-squared process)."""
 
 
-def recorded(log: Array, names: Sequence[str], closed: Array) -> list[dict[str, Any]]:
-    """Return events in the order of time: time [s], joint, kind, and the impulse [N s or N m s] of impacts.
+def recorded(log: Array, fields: Sequence[str], closed: Array) -> list[dict[str, Any]]:
+    """Return events in the order of time: time [s], joint or contact, kind, and the impulse [N s or N m s] of impacts.
 
-    log: time, gap and impulse of each, which is negative where a contact opens, (events, 3). names: joints of the gaps.
-    closed: which gaps are closed at the end, not 0. A gap that stays closed after several impacts `rests` from where
-    their times accumulate, with the number of `impacts`; it follows the last of these in the list.
+    log: time, contact, kind of `decision` and impulse of each, (events, 4). fields: what states the contacts, as
+    `contacts.NAME` or `joints.NAME.stops`. closed: which are closed at the end, not 0. A contact that stays closed
+    after several impacts `rests` from where their times accumulate, with the number of `impacts`; it follows the last
+    of these in the list.
     """
     found: list[dict[str, Any]] = []
     impacts: dict[int, list[int]] = {}
     rests: dict[int, dict[str, Any]] = {}
+    parts = [field.split(".") for field in fields]
+    places = [{part[0].removesuffix("s"): part[1]} for part in parts]
 
-    def rest(gap: int) -> None:
-        """Let the impacts of a gap so far end in rest."""
-        places = impacts.pop(gap, [])
-        if len(places) > 1:
-            times = [found[k]["time"] for k in places]
-            rests[places[-1]] = {"time": _limit(times), "joint": names[gap], "kind": "rests", "impacts": len(places)}
+    def rest(contact: int) -> None:
+        """Let the impacts of a contact so far end in rest."""
+        numbers = impacts.pop(contact, [])
+        if len(numbers) > 1:
+            times = [found[k]["time"] for k in numbers]
+            rests[numbers[-1]] = {"time": _limit(times), **places[contact], "kind": "rests", "impacts": len(numbers)}
 
-    for time, number, push in log.tolist():
-        gap = int(number)
-        event = {"time": time, "joint": names[gap], "kind": "opens"}
-        if push >= 0.0:
-            event |= {"kind": "impact", "impulse": push}
-            impacts.setdefault(gap, []).append(len(found))
-        else:
-            rest(gap)
+    for time, number, kind, push in log.tolist():
+        contact = int(number)
+        event = {"time": time, **places[contact], "kind": KINDS[kind]}
+        if kind == HIT:
+            event["impulse"] = push
+            impacts.setdefault(contact, []).append(len(found))
+        elif kind == LIFT:
+            rest(contact)
         found.append(event)
-    for gap in [gap for gap in impacts if closed[gap] != 0.0]:
-        rest(gap)
+    for contact in [contact for contact in impacts if closed[contact] != 0.0]:
+        rest(contact)
     return [each for k, event in enumerate(found) for each in (event, rests.get(k)) if each is not None]
+
+
+def place_of(event: Mapping[str, Any]) -> str:
+    """Return the name of the joint or the contact of an event."""
+    return str(event.get("contact") or event["joint"])
 
 
 def _limit(times: Sequence[float]) -> float:

@@ -28,6 +28,37 @@ SINGULAR = _rejects(
     "begin it farther away from that position, or with rates (initial, drives)",
 )
 NOT_FINITE = _rejects("not-finite", Status.DIVERGED, "The motion stops being finite.")
+NO_CONTACT_FORCE = _rejects(
+    "no-contact-force",
+    Status.FAILED,
+    "No force of a contact that slips keeps it closed, however large (Painleve's paradox): rigid bodies with so much "
+    "friction have no motion there.",
+    "a smaller mu, or another position",
+)
+SEVERAL_MOTIONS = _rejects(
+    "several-motions",
+    Status.FAILED,
+    "A contact that slips may stay closed or open, and nothing tells rigid bodies which (Painleve's paradox).",
+    "a smaller mu, or another position",
+)
+UNDECIDED_CONTACTS = _rejects(
+    "contacts-undecided",
+    Status.FAILED,
+    "No forces of the contacts that touch were found that obey Coulomb's law.",
+    "a smaller mu",
+)
+TOO_MANY_EVENTS = _rejects(
+    "too-many-events",
+    Status.FAILED,
+    "Contacts strike, open, stick and slip ever again, without an end.",
+    "a shorter solver.duration, or another restitution",
+)
+IMPACT_GAINS = _rejects(
+    "impact-gains-energy",
+    Status.ENERGY,
+    "The law of impact, with these coefficients of restitution at once or with friction, gains energy.",
+    "the same restitution for contacts that strike together",
+)
 TORN_OPEN = _rejects("joint-torn-open", Status.DIVERGED, "A joint opens without a drive, and the motion ends there.")
 NOT_CLOSED = _rejects("joint-not-closed", Status.DRIFTED, "A joint is open by more than the solver allows.")
 OUT_OF_REACH = _rejects(

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shoal.mechanics.analysis import evaluations
-from shoal.mechanics.forces import LAW, NATURAL
+from shoal.mechanics.gaps import shifted
 from shoal.mechanics.integrators import facts
 from shoal.mechanics.machine import Machine
 from shoal.mechanics.numerics.tile import SINGLE, Array
@@ -109,9 +109,5 @@ def follow(scene: Scene, times: Array, events: Array) -> GapHistory | None:
 def moved(scene: Scene, times: Array, shifts: Mapping[int, float]) -> Trajectory:
     """Return the motion with other limits. shifts: how much less of a gap there is [m or rad], by its number."""
     own = runs(Machine.of(scene), scene.solver, float(times[-1]))
-    gaps = own.model.gaps
-    law = gaps.measures.law.copy()
-    for gap, shift in shifts.items():
-        law[LAW * gap + NATURAL] += gaps.sign[gap] * shift
-    gaps = gaps._replace(measures=gaps.measures._replace(law=law))
+    gaps = shifted(own.model.gaps, shifts)
     return Runs(own.scene, replace(own.model, gaps=gaps, shared_tiles={}), own.choice).run(times)

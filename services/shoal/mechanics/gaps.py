@@ -1,54 +1,89 @@
-"""Gaps g(q) >= 0: a measure of `forces` against a limit, its rate, and the bias of its second derivative."""
+"""Contacts of a machine: one-sided limits of measures, dry friction along measures, and pairs of surfaces.
+
+Each has a normal direction, along which its gap g >= 0 closes, and where it rubs one tangent in the plane and two in
+space, along which it slips. Dry friction of a joint has no gap: it is closed for ever.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
-from shoal.mechanics import forces
-from shoal.mechanics.forces import ANGLE, DISTANCE, Forces
-from shoal.mechanics.numerics.tile import Array, Tile
+from shoal.mechanics import forces, pairs
+from shoal.mechanics.forces import ANGLE, DISTANCE, LAW, NATURAL, Forces
+from shoal.mechanics.numerics.tile import Array, Index, Tile
+from shoal.mechanics.pairs import Pairs
+
+LIMIT, DRY, PAIR = 0, 1, 2
+"""Kinds of contacts: a limit of a measure, dry friction of a given force along a measure, two surfaces."""
+STICK, SLIP = 1.0, 2.0
+"""Modes of closed contacts that rub."""
 
 
 class Gaps(NamedTuple):
-    """One-sided limits of one tile.
+    """Contacts of one tile.
 
-    measures: what is limited, with the limit for its natural value. sign: 1 of a lower limit, -1 of an upper one, and
-    restitution: rate after an impact over the rate before, with the opposite sign (Newton), both (gaps, lanes).
-    resolution: gaps below this are closed, [m or rad].
+    tangents: slip directions of each, 0 where none rubs. kind, number: what it is, and its number among the measures or
+    the pairs. rubs: whether it has friction. rolls: whether it sticks whatever the force. measures: what is limited,
+    with the limit for its natural value, or slips. sign: 1 of a lower limit and of friction, -1 of an upper limit.
+    restitution, tangential: rate after an impact over the rate before, with the opposite sign (Newton), along the
+    normal and of stick. mu, mu_static: coefficients of friction in slip and of the limit of stick; given: friction that
+    no normal force causes [N or N m]. The last six are (contacts, lanes). resolution: gaps below this are closed, [m or
+    rad].
     """
 
     size: int
+    tangents: int
+    kind: Index
+    number: Index
+    rubs: Index
+    rolls: Index
     measures: Forces
+    pairs: Pairs
     sign: Array
     restitution: Array
+    tangential: Array
+    mu: Array
+    mu_static: Array
+    given: Array
     resolution: float
 
 
 class GapWork(NamedTuple):
-    """Work space of one tile, by gap and lane unless stated.
+    """Work space of one tile, by contact and lane unless stated. A direction is the normal or a tangent of a contact.
 
-    memory: the continuous angles of angular gaps. value, rate: g [m or rad] and its rate; value_before, rate_before,
-    force_before: at the beginning of a step. closed: whether the contact is closed; hit: whether it is to be decided
-    on at the event that a step has ended at. force: multiplier of a closed contact, not negative [N or N m].
-    gradient, response: sign * g_q and the acceleration by a unit force, (gaps * unknowns, lanes). none: the
-    acceleration without forces, unit: a unit force, (rows, lanes). reaction: multipliers of the constraints: without
-    forces, by a unit force of each contact, and as they are, ((gaps + 2) * constraints, lanes). matrix, load, found:
-    of one lane, (gaps * gaps,) and (gaps,). log: time, gap and impulse of each event of the first lane, (3 * LOGGED,);
-    number: of events, (lanes,).
+    memory: the continuous angles of angular measures. value, rate: g [m or rad] and its rate; margin: of a contact that
+    slips the slip along `heading`, of one that sticks what is left to the limit of its friction. anchor:
+    where a joint sticks by dry friction [rad or m]; its value is the way from there. before: value, rate,
+    force and margin at the beginning of a step, (4 * contacts, lanes). closed: whether the contact is closed, mode:
+    whether it sticks or slips; hit: what event of it a step has ended at. force: multiplier by direction, of a closed
+    contact along the normal not negative [N or N m]. slip, bias: rate of each direction, and its derivative for
+    accelerations of zero. heading: direction of slip in the axes of the ground, (3 * contacts, lanes); axes: normal and
+    tangents, (9 * contacts, lanes). gradient, response: of each direction, and the acceleration by a unit force,
+    (directions * unknowns, lanes). none: the acceleration without forces, unit: a unit force, (rows, lanes). reaction:
+    multipliers of the constraints: without forces, by a unit force of each direction, and as they are, ((directions +
+    2) * constraints, lanes). matrix, load, found, way: of one lane. pair: `pairs.describe`. log: time, contact, kind
+    and impulse of each event of the first lane, (4 * LOGGED,); number: of events, alone: whether a lane of a tile of
+    several comes near an event, which it has to meet alone, (lanes,).
     """
 
     memory: Array
     value: Array
     rate: Array
-    value_before: Array
-    rate_before: Array
-    force_before: Array
+    margin: Array
+    anchor: Array
+    before: Array
     closed: Array
+    mode: Array
     hit: Array
     force: Array
+    slip: Array
+    bias: Array
+    heading: Array
+    axes: Array
     gradient: Array
     response: Array
     none: Array
@@ -57,43 +92,132 @@ class GapWork(NamedTuple):
     matrix: Array
     load: Array
     found: Array
+    way: Array
+    chosen: Array
+    pair: Array
     log: Array
     number: Array
+    alone: Array
 
 
 LOGGED = 4096
 """So many events of the first lane are kept."""
 
 
-def room(width: int, size: int, unknowns: int, rows: int, constraints: int) -> GapWork:
+def room(width: int, g: Gaps, unknowns: int, rows: int, constraints: int) -> GapWork:
     """Work space as arrays."""
-    each, vectors = (size * width,) * 9, (size * unknowns * width,) * 2
-    whole, reaction = rows * width if size else 0, (size + 2) * constraints * width if size else 0
-    small, log = (size * size, size, size), (3 * LOGGED, width) if size else (0, 0)
-    sizes = *each, *vectors, whole, whole, reaction, *small, *log
-    return GapWork._make([np.zeros(one) for one in sizes])
+    n = g.size
+    ways = n * (1 + g.tangents)
+    each, whole, reaction = n * width, rows * width if n else 0, (ways + 2) * constraints * width if n else 0
+    vectors, by_way = ways * unknowns * width, ways * width
+    sizes = {
+        "memory": g.measures.size * width, "before": 4 * each, "force": by_way, "slip": by_way, "bias": by_way,
+        "heading": 3 * each, "axes": 9 * each, "gradient": vectors, "response": vectors, "none": whole, "unit": whole,
+        "reaction": reaction, "matrix": ways * ways, "load": ways, "found": ways, "way": ways, "chosen": n,
+        "pair": pairs.ROOM if g.pairs.size else 0, "log": 4 * LOGGED if n else 0,
+        "number": width if n else 0, "alone": width if n else 0,
+    }  # fmt: skip
+    return GapWork._make([np.zeros(sizes.get(name, each)) for name in GapWork._fields])
+
+
+def shifted(gaps: Gaps, shifts: Mapping[int, float]) -> Gaps:
+    """Return the contacts with less of a gap [m or rad], by the contact's number."""
+    law, radius = gaps.measures.law.copy(), gaps.pairs.radius.copy()
+    for contact, shift in shifts.items():
+        number = int(gaps.number[contact])
+        if gaps.kind[contact] == PAIR:
+            radius[number] += shift
+        else:
+            law[LAW * number + NATURAL] += gaps.sign[contact] * shift
+    return gaps._replace(measures=gaps.measures._replace(law=law), pairs=gaps.pairs._replace(radius=radius))
 
 
 @njit(cache=True, error_model="numpy")
 def look(tile: Tile, gaps: Gaps, z: Array, zdot: Array, g: GapWork, room: Array) -> None:
-    """Values and rates of all gaps; derived rows of z and zdot must be filled. room: of 6 d + 3 rows. Pointers."""
-    width = len(tile)
+    """Values, rates, slips and margins of slip; derived rows of z and zdot must be filled. room: of 6 d + 3 rows.
+
+    Of pairs of surfaces axes and biases as well. Pointers.
+    """
+    width, ways = len(tile), 1 + gaps.tangents
     value = forces.value_row(gaps.measures) * width
-    for number in range(gaps.size):
-        forces.measure(tile, gaps.measures, number, z, g.memory, room)
-        forces.slip(tile, gaps.measures, number, zdot, room)
-        for lane in range(width):
-            at = number * width + lane
-            g.value[at] = gaps.sign[at] * room[value + lane]
-            g.rate[at] = gaps.sign[at] * room[value + width + lane]
+    for contact in range(gaps.size):
+        kind, number = gaps.kind[contact], gaps.number[contact]
+        if kind == PAIR:
+            for lane in range(width):
+                _look_at_pair(gaps, contact, width, lane, z, zdot, g)
+        else:
+            forces.measure(tile, gaps.measures, number, z, g.memory, room)
+            forces.slip(tile, gaps.measures, number, zdot, room)
+            for lane in range(width):
+                at = contact * width + lane
+                rate = gaps.sign[at] * room[value + width + lane]
+                g.value[at], g.rate[at] = 0.0, 0.0
+                if kind == DRY:
+                    g.value[at] = room[value + lane] - g.anchor[at]
+                    g.slip[(contact * ways + 1) * width + lane] = rate
+                    g.axes[(9 * contact + 3) * width + lane] = 1.0
+                else:
+                    g.value[at], g.rate[at] = gaps.sign[at] * room[value + lane], rate
+        if gaps.rubs[contact] > 0:
+            for lane in range(width):
+                if g.mode[contact * width + lane] == SLIP:
+                    g.margin[contact * width + lane] = slip_along(gaps, g, contact, width, lane)
 
 
 @njit(cache=True, error_model="numpy")
-def bias(tile: Tile, gaps: Gaps, number: int, lane: int, z: Array, zdot: Array) -> float:
-    """Return the second derivative of a gap by time for accelerations of zero, zdot' g_qq zdot, in one lane."""
-    width, d, first = len(tile), gaps.measures.dimensions, 3 * gaps.measures.dimensions * number
-    rows, kind = gaps.measures.rows, gaps.measures.kind[number]
-    sign = gaps.sign[number * width + lane]
+def _look_at_pair(gaps: Gaps, contact: int, width: int, lane: int, z: Array, zdot: Array, g: GapWork) -> None:
+    ways, rows = 1 + gaps.tangents, pairs.pair_rows(gaps.pairs.dimensions)
+    pairs.describe(gaps.pairs, gaps.number[contact], width, lane, ways, z, zdot, g.pair)
+    g.value[contact * width + lane] = g.pair[0]
+    for k in range(9):
+        g.axes[(9 * contact + k) * width + lane] = g.pair[1 + k]
+    for way in range(ways):
+        at, end = (contact * ways + way) * width + lane, 10 + way * (rows + 2) + rows
+        g.slip[at], g.bias[at] = g.pair[end], g.pair[end + 1]
+    g.rate[contact * width + lane] = g.slip[contact * ways * width + lane]
+
+
+@njit(cache=True, error_model="numpy")
+def slip_along(gaps: Gaps, g: GapWork, contact: int, width: int, lane: int) -> float:
+    """Return the slip rate along the direction in which a contact has slipped [m/s or rad/s]."""
+    ways, total = 1 + gaps.tangents, 0.0
+    for k in range(3):
+        here = 0.0
+        for way in range(1, ways):
+            axis = g.axes[(9 * contact + 3 * way + k) * width + lane]
+            here += axis * g.slip[(contact * ways + way) * width + lane]
+        total += here * g.heading[(3 * contact + k) * width + lane]
+    return total
+
+
+@njit(cache=True, error_model="numpy")
+def add_unit(tile: Tile, gaps: Gaps, contact: int, way: int, z: Array, zdot: Array, g: GapWork, room: Array) -> None:
+    """Add a unit force along one direction of a contact to g.unit, rows that forces act on, and find its bias."""
+    width, ways, number, d = len(tile), 1 + gaps.tangents, gaps.number[contact], gaps.measures.dimensions
+    if gaps.kind[contact] == PAIR:
+        rows = pairs.pair_rows(d)
+        begin = 10 + way * (rows + 2)
+        for lane in range(width):
+            _look_at_pair(gaps, contact, width, lane, z, zdot, g)
+            for k in range(rows):
+                g.unit[gaps.pairs.rows[rows * number + k] * width + lane] += g.pair[begin + k]
+        return
+    rows = 3 * d
+    forces.measure(tile, gaps.measures, number, z, g.memory, room)
+    for k in range(rows):
+        row = gaps.measures.rows[rows * number + k]
+        for lane in range(width):
+            g.unit[row * width + lane] += gaps.sign[contact * width + lane] * room[(rows + k) * width + lane]
+    for lane in range(width):
+        sign = gaps.sign[contact * width + lane]
+        g.bias[(contact * ways + way) * width + lane] = sign * _bias(tile, gaps.measures, number, lane, z, zdot)
+
+
+@njit(cache=True, error_model="numpy")
+def _bias(tile: Tile, measures: Forces, number: int, lane: int, z: Array, zdot: Array) -> float:
+    """Return the second derivative of a measure by time for accelerations of zero, zdot' g_qq zdot, in one lane."""
+    width, d, first = len(tile), measures.dimensions, 3 * measures.dimensions * number
+    rows, kind = measures.rows, measures.kind[number]
     if kind == ANGLE and d == 2:
         total = 0.0
         for end in range(2):
@@ -101,7 +225,7 @@ def bias(tile: Tile, gaps: Gaps, number: int, lane: int, z: Array, zdot: Array) 
             square = z[x] * z[x] + z[y] * z[y]
             along, across = z[x] * zdot[x] + z[y] * zdot[y], z[x] * zdot[y] - z[y] * zdot[x]
             total += (1.0 if end == 0 else -1.0) * 2.0 * along * across / (square * square)
-        return sign * total  # type: ignore[no-any-return]
+        return total  # type: ignore[no-any-return]
     # Products of vectors and of their rates, by component.
     rr, ru, uu, dd, de, ee, rd, turning, ue = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     x, y, xr, yr, xb, yb = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -122,13 +246,13 @@ def bias(tile: Tile, gaps: Gaps, number: int, lane: int, z: Array, zdot: Array) 
             rd, turning, ue = rd + r * z[c], turning + r * zdot[c] + u * z[c], ue + u * zdot[c]
     if kind == ANGLE:
         square, turn = x * x + y * y, x * yr - y * xr
-        return sign * ((x * yb - y * xb) / square - 2.0 * turn * (x * xr + y * yr) / (square * square))  # type: ignore[no-any-return]
+        return (x * yb - y * xb) / square - 2.0 * turn * (x * xr + y * yr) / (square * square)  # type: ignore[no-any-return]
     if kind == DISTANCE:
-        return sign * (uu - ru * ru / rr) / np.sqrt(rr)  # type: ignore[no-any-return]
+        return (uu - ru * ru / rr) / np.sqrt(rr)  # type: ignore[no-any-return]
     # r.d / |d|, the second derivative of a quotient.
     size = np.sqrt(dd)
     slope = de / size
     bend = (ee - slope * slope) / size
     place, rate = rd / size, turning
     first_rate = (rate - place * slope) / size
-    return sign * (2.0 * ue - place * bend - 2.0 * first_rate * slope) / size  # type: ignore[no-any-return]
+    return (2.0 * ue - place * bend - 2.0 * first_rate * slope) / size  # type: ignore[no-any-return]

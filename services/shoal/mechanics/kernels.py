@@ -21,7 +21,8 @@ from shoal.compile import function_pointers, locks
 from shoal.compile.function_pointers import call
 from shoal.compile.pointers import raw_type
 from shoal.compile.structures import Reference, storage
-from shoal.mechanics import contact, dynamics
+from shoal.mechanics import dynamics
+from shoal.mechanics.contact import decision, motion, response
 from shoal.mechanics.dynamics import ACCELERATION, ALL, ELASTIC, SIMPLE, Work, instant
 from shoal.mechanics.elements import families
 from shoal.mechanics.elements.families import KERNELS
@@ -84,7 +85,7 @@ def settle(
         ready = found and m.table.sought == 0 and m.method == PROJECTION
         arguments = (m, w, t, tolerance, iterations, ready)
         call(m.table.settle, (tile, *arguments))
-    if m.gaps.size > 0:
+    if m.gaps.size > 0 and len(tile) == 1:
         call(m.table.hold, (tile, m, w, t, tolerance))
 
 
@@ -128,34 +129,34 @@ def _least(tile, m, w, t, z, zdot, tolerance, a):  # type: ignore[no-untyped-def
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def look(tile: Tile, m: Arrays, w: Work, z: Array, zdot: Array) -> None:
-    """`contact.look`."""
+    """`response.look`."""
     call(m.table.look, (tile, m, w, z, zdot))
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def decide(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float) -> None:
-    """`contact.decide`."""
+    """`decision.decide`."""
     call(m.table.decide, (tile, m, w, t, tolerance))
 
 
 @njit(cache=True, error_model="numpy")
 def _look(tile, m, w, z, zdot):  # type: ignore[no-untyped-def]
-    contact.look(tile, m, w, z, zdot)
+    response.look(tile, m, w, z, zdot)
 
 
 @njit(cache=True, error_model="numpy")
 def _contact(tile, m, w, t, z, zdot, tolerance, a):  # type: ignore[no-untyped-def]
-    contact.accelerate(tile, m, w, t, z, zdot, tolerance, a)
+    motion.accelerate(tile, m, w, t, z, zdot, tolerance, a)
 
 
 @njit(cache=True, error_model="numpy")
 def _hold(tile, m, w, t, tolerance):  # type: ignore[no-untyped-def]
-    contact.settle(tile, m, w, t, tolerance)
+    motion.settle(tile, m, w, t, tolerance)
 
 
 @njit(cache=True, error_model="numpy")
 def _decide(tile, m, w, t, tolerance):  # type: ignore[no-untyped-def]
-    contact.decide(tile, m, w, t, tolerance)
+    decision.decide(tile, m, w, t, tolerance)
 
 
 @njit(cache=True, error_model="numpy")
@@ -214,7 +215,7 @@ def ready(tile: Tile, arrays: Arrays, room: Work) -> Arrays:
     acting = tuple(type(family) if family.size > 0 else None for family in arrays.elements)
     key = len(tile), arrays.constraints.size > 0, arrays.gaps.size > 0, acting
     if key not in _READY:
-        wanted = _wanted(arrays)
+        wanted = _wanted(tile, arrays)
         state = [_address(name, tile, arrays, room) if name in wanted else 0 for name in _STATE_KERNELS]
         pointers = (family_pointers(name, tile, arrays.elements) for name in ("force", "energy", "mean"))
         _READY[key] = FunctionTable._make([*state, len(acting), *pointers, 0])
@@ -235,14 +236,15 @@ def signatures(tile: Tile, arrays: Arrays, room: Work, *, every: bool = False) -
 
     every: the kernels of any model
     """
-    found = [_kernel(name, tile, arrays, room) for name in (_USUAL if every else _wanted(arrays))]
+    found = [_kernel(name, tile, arrays, room) for name in (_USUAL if every else _wanted(tile, arrays))]
     elements = [family for family in arrays.elements if every or family.size > 0]
     return found + [_kernel(name, tile, one) for name in _FAMILY_KERNELS for one in elements if _has(name, one)]
 
 
-def _wanted(arrays: Arrays) -> tuple[str, ...]:
+def _wanted(tile: Tile, arrays: Arrays) -> tuple[str, ...]:
     constrained = _CONSTRAINED if arrays.constraints.size > 0 else ()
-    return *_FREE, *constrained, *(_CONTACTS if arrays.gaps.size > 0 else ())
+    contacts = _CONTACTS if tile == SINGLE else _CONTACTS[:1]  # lanes meet their events alone
+    return *_FREE, *constrained, *(contacts if arrays.gaps.size > 0 else ())
 
 
 def _kernel(name: str, tile: Tile, *parts: Any) -> Kernel:

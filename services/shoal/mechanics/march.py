@@ -181,6 +181,9 @@ def loop(frame):  # type: ignore[no-untyped-def]
         sampling = sample < len(times) and (free or times[sample] < now + step * (1 - 1e-9))
         begin = now
         taken = _advance(tile, scheme, m, w, k, halts, now, rest, snap, tolerance, sampling)
+        if m.gaps.size > 0 and len(tile) > 1 and events.approach(tile, m, w, taken):
+            own[DONE] = 1.0
+            break
         arrived = taken >= rest
         if free:
             number += 1
@@ -207,7 +210,7 @@ def loop(frame):  # type: ignore[no-untyped-def]
         record.evaluations[lane] = scheme.evaluations[0]
         record.reached[lane], record.closeness[lane] = now, w.gauss.closeness[lane]
         record.singular[lane] = w.gauss.near[lane]
-    for i in range(2 * len(tile)):
+    for i in range(3 * len(tile)):
         record.ended[i] = w.gauss.ended[i]
 
 
@@ -225,8 +228,10 @@ def _begin(tile: Tile, m: Arrays, w: Work, k: LoopRoom, record: Marched, marker_
     _count_turns(tile, m, w, k, marker_rows)
     for i in range(marker_rows.size // (2 * m.dimensions) * len(tile)):
         k.turns[i] = 0.0
-    if m.gaps.size > 0:
+    if m.gaps.size > 0 and len(tile) == 1:
         k.progress[EVENT] = events.touching(tile, m, w)
+    elif m.gaps.size > 0:
+        events.begin(tile, m, w)
 
 
 @njit(cache=True, error_model="numpy")
@@ -287,6 +292,8 @@ def _leave_halt(
         _energy(tile, m, w, k.energy, scale)
         for lane in range(len(tile)):
             k.dissipated[lane] -= k.energy[lane]
+    if m.gaps.size > 0:
+        kernels.look(tile, m, w, w.z, w.zdot)
     kernels.acceleration(tile, m, w, now, w.z, w.zdot, tolerance, w.a)
     for lane in range(len(tile)):
         k.last_power[lane] = w.power[lane]
@@ -302,6 +309,7 @@ def _leave_event(
     for lane in range(len(tile)):
         k.dissipated[lane] += k.energy[lane]
     kernels.decide(tile, m, w, now, tolerance)
+    kernels.look(tile, m, w, w.z, w.zdot)
     _energy(tile, m, w, k.energy, scale)
     for lane in range(len(tile)):
         k.dissipated[lane] -= k.energy[lane]
@@ -327,16 +335,16 @@ def _advance(
     keep: whether the motion inside it will be needed.
     """
     end = m.unknowns * len(tile)
-    watched = halts.marks.size > 0
-    if keep or watched or m.gaps.size > 0 or (scheme.adaptive and loaded(m)):
+    watched, touches = halts.marks.size > 0, m.gaps.size > 0 and len(tile) == 1
+    if keep or watched or touches or (scheme.adaptive and loaded(m)):
         for i in range(end):
             k.past[i], k.past[end + i], k.past[2 * end + i] = w.z[i], w.zdot[i], w.a[i]
     if watched:
         derive(tile, m.derived, w.z, m.unknowns, m.force_rows, False)
         elongations(tile, m.forces, w.z, w.memory, w.element, k.elongation)
     taken, aims = float(rest), 0
-    if m.gaps.size > 0:
-        events.begin(tile, m, w)
+    if touches:
+        events.shift(tile, m, w)
     while True:
         asked = taken
         taken = advance(tile, scheme, m, w, now, asked)
@@ -345,7 +353,7 @@ def _advance(
             derive(tile, m.derived, w.z, m.unknowns, m.force_rows, False)
             if leapt(tile, m.forces, halts, k.elongation, w.z, w.memory, w.element):
                 again, aims = 0.5 * taken, 0
-        if m.gaps.size > 0 and again == taken:
+        if touches and again == taken:
             if aims == 0:
                 found = events.first(tile, scheme, m, w, k, now, taken, tolerance)
                 if found <= 1.0:
@@ -353,12 +361,12 @@ def _advance(
             elif aims <= AIMS:
                 again, aims = min(taken + events.miss(tile, m, w), rest), aims + 1
         if again == taken:
-            if m.gaps.size > 0:
+            if touches:
                 k.progress[EVENT] = 1.0 if aims > 0 else 0.0
             return taken  # type: ignore[no-any-return]
         for i in range(end):
             w.z[i], w.zdot[i], w.a[i] = k.past[i], k.past[end + i], k.past[2 * end + i]
-        if m.gaps.size > 0 and aims <= 1:
+        if touches and aims <= 1:
             events.begin(tile, m, w)
         restart(scheme)
         taken = again
@@ -375,7 +383,7 @@ def _account(
     if free:
         for x in (LOBATTO, 1.0 - LOBATTO):
             interpolate(tile, scheme, m, w, k.past, x, taken, k.q, k.v)
-            if m.driven or m.rubbing.size > 0:
+            if m.driven or m.rubbing.size > 0 or m.gaps.tangents > 0:
                 kernels.acceleration(tile, m, w, begin + x * taken, k.q, k.v, tolerance, w.stage)
             else:
                 kernels.force(tile, m, w, begin + x * taken, k.q, k.v, w.stage)

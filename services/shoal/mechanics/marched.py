@@ -32,7 +32,7 @@ class Marched(NamedTuple):
     energy_error: largest |E + dissipated - E(0)| [J]; energy_scale: largest energy in motion [J], kinetic, of
     bent bodies and the size of that of springs; drift: largest violation of a constraint by its power of a length,
     (POWERS * lanes,); begin: coordinates and rates at the start, made consistent, (2 * unknowns, lanes);
-    ended, closeness, singular: as in `GaussWork` (near), (2 * lanes,) and (lanes,).
+    ended, closeness, singular: as in `GaussWork` (near), (3 * lanes,) and (lanes,).
     Common to the lanes of a tile: steps taken, evaluations of the forces, the time reached [s].
     """
 
@@ -95,7 +95,7 @@ def rooms(tile: Tile, arrays: Arrays, times: int, marker_rows: Index) -> tuple[M
         np.zeros(width),
         np.zeros(constraints.POWERS * width),
         np.zeros(2 * end),
-        np.zeros(2 * width),
+        np.zeros(3 * width),
         np.zeros(width),
         np.zeros(width),
         np.zeros(width),
@@ -176,11 +176,11 @@ def frame_type(frame: Frame) -> Any:
 
 
 FARTHEST, ENERGY_DRIFT, CONSTRAINT_DRIFT, ENERGY_SCALE = range(4)
-STEPS, EVALUATIONS, REACHED, ENDED, UNCLOSED, CLOSENESS, SINGULAR = range(4, 11)
+STEPS, EVALUATIONS, REACHED, ENDED, UNCLOSED, CLOSENESS, SINGULAR, UNDECIDED = range(4, 12)
 """Rows of the numbers that a run is judged by: the largest distance of a marker from its nearest anchor [m]; the energy
 error over the largest energy in motion; the largest violation of a constraint, relative to the machine's size;
 and as `Marched` has them."""
-NUMBERS = 11
+NUMBERS = 12
 
 
 @njit(cache=True, error_model="numpy")
@@ -235,6 +235,7 @@ def reduce_record(
         numbers[EVALUATIONS, lane], numbers[REACHED, lane] = record.evaluations[own], record.reached[own]
         numbers[ENDED, lane], numbers[UNCLOSED, lane] = record.ended[own], record.ended[width + own]
         numbers[CLOSENESS, lane], numbers[SINGULAR, lane] = record.closeness[own], record.singular[own]
+        numbers[UNDECIDED, lane] = record.ended[2 * width + own]
 
 
 @njit(cache=True, error_model="numpy")

@@ -23,6 +23,7 @@ from shoal.mechanics.assembly.redundancy import redundant_joints
 from shoal.mechanics.assembly.starts import Starts
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.ended import Ended
+from shoal.mechanics.gaps import DRY
 from shoal.mechanics.halts import Halts
 from shoal.mechanics.integrators import Choice, halting
 from shoal.mechanics.integrators import facts as facts_of
@@ -127,8 +128,12 @@ class Runs:
                 closed.extend(space.closed)
             if single not in self._found:
                 self._found[single] = pickle.dumps(self._facts(record.begin if single else None))
+            gaps = space.march.frame.room.gaps
+            alone = np.flatnonzero(gaps.alone[:count]) if count > 1 else ()
             if seek is None and self._alike and space.size <= LARGEST:
                 idle.append(space)
+            for lane in alone:  # its events would cut the steps of all
+                march(slice(part.start + int(lane), part.start + int(lane) + 1))
 
         if end == 0.0 and seek is None and self._alike and not self.model.constraints.size:
             self._still.fill(moved, turns, limits.anchors, motion, numbers)
@@ -189,6 +194,8 @@ class Runs:
         Lanes of adaptive integrators stay together, so that neighbours take equal steps. The number of threads has no
         influence.
         """
+        if np.any(self.model.gaps.kind == DRY):  # whose contacts are closed from the start
+            return [slice(k, k + 1) for k in range(lanes)]
         _, parts = tiles(lanes)
         rest = lanes % len(WIDE)
         if lanes == 1 or facts_of(self.choice.name).adaptive or not self._alike:

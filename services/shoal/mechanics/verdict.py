@@ -11,6 +11,7 @@ from shoal.mechanics import findings as kinds
 from shoal.mechanics import reach as reaches
 from shoal.mechanics.affine import NEGLIGIBLE
 from shoal.mechanics.constraints import OPEN
+from shoal.mechanics.contact import coulomb, decision
 from shoal.mechanics.forces import ANGLE, LAW, STIFFNESS
 from shoal.mechanics.functions import value
 from shoal.mechanics.integrators import Choice, facts
@@ -24,6 +25,7 @@ from shoal.mechanics.marched import (
     SINGULAR,
     STEPS,
     UNCLOSED,
+    UNDECIDED,
 )
 from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import Array, Flags
@@ -45,6 +47,14 @@ CROSSING = (
 )
 """Reason where a motion creeps at a singular position."""
 
+CONTACT_TROUBLES = {
+    coulomb.NO_FORCE: kinds.NO_CONTACT_FORCE,
+    coulomb.SEVERAL: kinds.SEVERAL_MOTIONS,
+    coulomb.UNDECIDED: kinds.UNDECIDED_CONTACTS,
+    decision.TOO_MANY: kinds.TOO_MANY_EVENTS,
+    decision.GAINS: kinds.IMPACT_GAINS,
+}
+"""Why contacts end a motion."""
 _JUDGED = slice(FARTHEST, CONSTRAINT_DRIFT + 1)
 """What has a largest value."""
 
@@ -127,6 +137,8 @@ class Limits:
             return kinds.NO_START.found("no start agrees with the joints and with what is stated")
         if not finite and numbers[UNCLOSED] >= 0:
             return self._open(kinds.NOT_CLOSED if self._driven else kinds.TORN_OPEN, numbers, adaptive)
+        if not finite and numbers[UNDECIDED] >= 0:
+            return self._contact(int(numbers[UNDECIDED]), float(numbers[ENDED]))
         singular = numbers[SINGULAR] == HERE
         if not finite and np.isfinite(energy_drift) and adaptive and (singular or steps >= self._solver.max_steps):
             there = f"{steps:.0f} steps of {choice.name} led to {numbers[REACHED]:.4g} s only"
@@ -149,6 +161,12 @@ class Limits:
         if not constraint_drift <= OPEN:
             return self._open(kinds.NOT_CLOSED, numbers, adaptive)
         return None
+
+    def _contact(self, trouble: int, time: float) -> Finding:
+        """Name the contact that could not be decided on, and when."""
+        contact, outcome = divmod(trouble, coulomb.TROUBLES)
+        field = self._model.gap_fields[contact]
+        return CONTACT_TROUBLES[outcome].found(f"{field} cannot be decided on at t = {time:.6g} s", time=time)
 
     def _open(self, kind: Kind, numbers: Array, adaptive: bool) -> Finding:
         """Name the joint that no position closes, since when, and the likely causes."""

@@ -123,14 +123,13 @@ class Workspace:
     @property
     def events(self) -> list[dict[str, Any]]:
         """Events of contacts in a march of one lane, the first `LOGGED` of them, see `event_record.recorded`."""
-        gaps = self.march.frame.room.gaps
-        names = [field.split(".")[1] for field in self._model.gap_fields]
-        if not names:
+        gaps, fields = self.march.frame.room.gaps, self._model.gap_fields
+        if not fields:
             return []
-        log = gaps.log[: 3 * int(gaps.number[0])].reshape(-1, 3)
+        log = gaps.log[: 4 * int(gaps.number[0])].reshape(-1, 4)
         # Where a log is full, what became of its contacts later is not known.
         whole = len(log) == int(gaps.number[0])
-        return recorded(log, names, gaps.closed if whole else np.zeros_like(gaps.closed))
+        return recorded(log, fields, gaps.closed if whole else np.zeros_like(gaps.closed))
 
     @property
     def closed(self) -> list[str]:

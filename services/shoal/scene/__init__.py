@@ -1,6 +1,7 @@
 """The scene of a user: bodies, joints, loads, markers, initial state, gravity and solver settings, in SI units."""
 
 from shoal.scene.bodies import FRAMED, Body, Rod
+from shoal.scene.contacts import Contact, ContactSurface
 from shoal.scene.function import Function
 from shoal.scene.initial import InitialState
 from shoal.scene.joints import (
@@ -37,6 +38,8 @@ __all__ = [
     "LOAD_KINDS",
     "Attachment",
     "Body",
+    "Contact",
+    "ContactSurface",
     "Coupling",
     "Cylindrical",
     "Distance",

@@ -86,7 +86,7 @@ def _check_plane(part: Any, path: str) -> None:
 
 def _is_spatial(name: str, value: Any) -> bool:
     """Return whether a field says what nothing in the plane has."""
-    if name in ("axis", "second_axis"):
+    if name in ("axis", "second_axis", "plane"):
         return value is not None and value not in (_Z, "x", "y")
     if name == "z":
         return getattr(value, "number", None) != 0.0
@@ -99,7 +99,7 @@ def _is_spatial(name: str, value: Any) -> bool:
 
 _PARTS = (Record, dict, tuple)
 _SPATIAL = {"axis", "second_axis", "z", "inertia", "side_curvature", "twist", "director", "rotation", "spin"}
-_SPATIAL |= {"torsion_constant"}
+_SPATIAL |= {"torsion_constant", "plane"}
 """Fields of which `_is_spatial` speaks."""
 _VECTORS = {"gravity", "position", "velocity", "point", "force", "centre_of_mass", "named_points"}
 

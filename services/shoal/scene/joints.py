@@ -31,12 +31,12 @@ class Attachment(Record):
     """Named point, or coordinates in the body's frame [m]; on a flexible rod the arc length and 0."""
 
 
-def _origin_of_ground(place: Any) -> Any:
+def origin_of_ground(place: Any) -> Any:
     """Return a place with the origin for its point, if it names the ground and no point of it."""
     return {"point": (0.0, 0.0), **place} if isinstance(place, dict) and place.get("body") == GROUND else place
 
 
-Direction = Annotated[Attachment, BeforeValidator(_origin_of_ground)]
+Direction = Annotated[Attachment, BeforeValidator(origin_of_ground)]
 """An attachment of whose body only the direction matters: on the ground the point may be left out."""
 
 
@@ -101,10 +101,23 @@ class Resisted(Tie):
     """Dry friction [N m; of a slider N], smoothed as tanh(rate / coulomb_speed)."""
     coulomb_speed: Positive = 1e-2
     """Rate that smooths dry friction [rad/s; of a slider m/s]."""
+    stick: Literal["smooth", "exact"] = "smooth"
+    """Whether dry friction is smoothed, so that what should stick creeps, or sticks and slips by Coulomb's law."""
     mu: NonNegative = 0.0
-    """Coefficient of dry friction by the joint's force [1], smoothed alike."""
+    """Coefficient of dry friction by the joint's force [1], smoothed."""
     stops: Stops | None = None
     """Limits of its free motion."""
+
+    @model_validator(mode="after")
+    def _of_one_law(self) -> Resisted:
+        if self.stick == "exact":
+            if "coulomb_speed" in self.model_fields_set:
+                raise ValueError("coulomb_speed: smooths friction, and stick: exact does not; leave one of them out")
+            if np.any(self.mu):
+                raise ValueError("mu: is smoothed; stick: exact is of a given friction, `coulomb`")
+            if not np.any(self.coulomb):
+                raise ValueError("stick: exact is of dry friction; state `coulomb`")
+        return self
 
     @property
     def share(self) -> float:

@@ -16,6 +16,7 @@ from shoal.errors import InputError
 from shoal.scene import joints as joint_types
 from shoal.scene.amplitudes import check_amplitudes, check_place
 from shoal.scene.bodies import FRAMED, Body, Rod
+from shoal.scene.contacts import Contact, check_contacts
 from shoal.scene.dimensions import Dimensions, check_dimensions, padded
 from shoal.scene.ended import End
 from shoal.scene.expect import Expectation, ExpectedValue
@@ -65,6 +66,8 @@ class Scene(Record):
     """Bodies by name."""
     joints: dict[Name, Joint] = {}
     """Joints by name."""
+    contacts: dict[Name, Contact] = {}
+    """Contacts between bodies by name."""
     loads: dict[Name, Load] = {}
     """Loads by name."""
     ground_points: dict[Name, MovingPoint] = {}
@@ -105,7 +108,11 @@ class Scene(Record):
         parts = [_counted("body", "bodies", self.bodies), _counted("joint", "joints", self.joints)]
         if elements := sum(body.elements for body in self.bodies.values() if body.element != "rigid"):
             parts[0] += f" of {elements} element{'s' * (elements != 1)}"
-        parts += [_counted("load", "loads", self.loads), _counted("marker", "markers", self.markers)]
+        parts += [
+            _counted("contact", "contacts", self.contacts),
+            _counted("load", "loads", self.loads),
+            _counted("marker", "markers", self.markers),
+        ]
         return f"Scene({self.name}: {'; '.join(part for part in parts if part)})"
 
     @model_validator(mode="after")
@@ -129,6 +136,9 @@ class Scene(Record):
                         f"joints.{name}: joins {joint.first.body!r} to itself; a joint needs two bodies, or two places "
                         "of a flexible rod"
                     )
+        for name, contact in self.contacts.items():
+            for field, side in joint_types.sides(contact).items():
+                self._check_attachment(f"contacts.{name}.{field}", side)
         for name, load in self.loads.items():
             for field, side in joint_types.sides(load).items():
                 self._check_attachment(f"loads.{name}.{field}", side)
@@ -148,6 +158,7 @@ class Scene(Record):
             check_amplitudes(name, self.bodies[name], self.initial[name])
         self._check_directions()
         check_dimensions(self)
+        check_contacts(self)
         placed = self._placed()
         loose = [name for name in self.bodies if name not in placed]
         if loose:

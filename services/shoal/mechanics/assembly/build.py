@@ -7,10 +7,10 @@ from dataclasses import replace
 from shoal.compile import progress
 from shoal.errors import InputError
 from shoal.mechanics import fitting, functions, terms
+from shoal.mechanics.assembly.contacts import Contacts
 from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.assembly.loads import Loads, naming
 from shoal.mechanics.assembly.masses import Masses
-from shoal.mechanics.assembly.one_sided import OneSided
 from shoal.mechanics.assembly.placement import place
 from shoal.mechanics.derived import RowAllocator
 from shoal.mechanics.least import principle
@@ -25,24 +25,18 @@ def with_start(model: Model, scene: Scene, lanes: int) -> Model:
     """The same model with the initial state of a scene that differs in nothing else."""
     placement = place(scene)
     stated, scene = scene, placement.scene
-    sided = _one_sided(scene, placement)
+    contacts = Contacts(scene, placement, RowAllocator(0))
     return replace(
         model,
         scene=scene,
         stated=stated,
-        failed=placement.failed | sided.beyond,
+        failed=placement.failed | contacts.beyond,
         lanes=lanes,
         q0=stacked(placement.positions),
         v0=stacked(placement.velocities),
         start_angles=stacked(Loads(scene, placement, RowAllocator(0), 0.0).angles),
-        gap_angles=stacked(sided.angles),
+        gap_angles=stacked(contacts.angles),
     )
-
-
-def _one_sided(scene: Scene, placement: Placement) -> OneSided:
-    sided = OneSided(scene, placement, RowAllocator(0), 0.0)
-    sided.gaps()
-    return sided
 
 
 def build(scene: Scene, lanes: int = 1, horizon: float = 0.0, placement: Placement | None = None) -> Model:
@@ -57,12 +51,12 @@ def build(scene: Scene, lanes: int = 1, horizon: float = 0.0, placement: Placeme
     horizon = max(horizon, scene.solver.duration)
     rows = RowAllocator(len(placement.positions))
     masses = Masses(scene, placement, rows)
-    loads, sided = Loads(scene, placement, rows, horizon), OneSided(scene, placement, rows, 0.0)
-    gaps = sided.gaps()
+    loads, contacts = Loads(scene, placement, rows, horizon), Contacts(scene, placement, rows)
+    gaps = contacts.gaps()
     if gaps.size and loads.rubbing:
         raise InputError(
-            f"{sided.fields[0]}: friction by the force of a joint (joints.{loads.rubbing[0][0]}.mu) knows "
-            "no one-sided constraints yet"
+            f"{contacts.fields[0]}: friction by the force of a joint (joints.{loads.rubbing[0][0]}.mu) knows "
+            "no contacts yet"
         )
     force_rows = rows.size
     held = terms.assemble(placement.terms, rows, len(loads.fitted), span(scene))
@@ -84,7 +78,7 @@ def build(scene: Scene, lanes: int = 1, horizon: float = 0.0, placement: Placeme
         scene=scene,
         stated=stated,
         dimensions=scene.dimensions,
-        failed=placement.failed | sided.beyond,
+        failed=placement.failed | contacts.beyond,
         frames=placement.frames,
         lanes=lanes,
         q0=stacked(placement.positions),
@@ -103,8 +97,8 @@ def build(scene: Scene, lanes: int = 1, horizon: float = 0.0, placement: Placeme
         start_angles=stacked(loads.angles),
         applied=loads.applied(),
         gaps=gaps,
-        gap_fields=tuple(sided.fields),
-        gap_angles=stacked(sided.angles),
+        gap_fields=tuple(contacts.fields),
+        gap_angles=stacked(contacts.angles),
         functions=functions.pack(loads.fitted),
         kinks=tuple(one.kinks for one in loads.fitted),
         constraints=held,

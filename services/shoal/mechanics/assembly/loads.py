@@ -181,7 +181,8 @@ class Loads(Measures):
             LOADS[type(load)](self, name, load)
 
     def _friction(self, name: str, joint: Revolute | Slider) -> None:
-        law = ElementForceLaw(damping=joint.friction, coulomb=joint.coulomb, speed=joint.coulomb_speed, drag=joint.drag)
+        smoothed = 0.0 if joint.stick == "exact" else joint.coulomb  # else a contact, see `contacts`
+        law = ElementForceLaw(damping=joint.friction, coulomb=smoothed, speed=joint.coulomb_speed, drag=joint.drag)
         if np.any(joint.share):
             self.rubbing.append((name, len(self.kinds), joint.share))
         if isinstance(joint, Revolute):

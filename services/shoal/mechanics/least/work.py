@@ -49,7 +49,8 @@ class GaussWork(NamedTuple):
     HERE, else 0, (lanes,). closeness: inverse square of the smallest distance from singular positions so far, the
     remainder of a row relative to its length, (lanes,); 0: not known. power: that of the rows by which third
     derivatives hold a motion on its branch [W], (lanes,). ended: by lane the instant [s] from which its motion is no
-    number, then the constraint that could not be closed, or UNENDED.
+    number, then the constraint that could not be closed and the
+    contact that could not be decided (`contact.coulomb.TROUBLES`), or UNENDED.
     """
 
     jacobian: Array
@@ -85,7 +86,7 @@ def work_space(width: int, m: Arrays) -> GaussWork:
     lane = LaneWork(*first, np.zeros(n), np.zeros(n))
     group, room = together.room(width, count, n), saddle.room(m.saddle.size, m.saddle.slots, width)
     matrices = jacobian, turning, residual, response, gram
-    vectors = multiplier, gap, extra, moved, lent, branch, near, closeness, power, np.full(2 * width, UNENDED)
+    vectors = multiplier, gap, extra, moved, lent, branch, near, closeness, power, np.full(3 * width, UNENDED)
     return GaussWork(*matrices, *vectors, lane, group, room)
 
 

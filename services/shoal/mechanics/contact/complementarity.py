@@ -42,8 +42,11 @@ def solve(n: int, matrix: Array, load: Array, active: Array, out: Array) -> None
 
 
 @njit(cache=True, error_model="numpy")
-def complementary(n: int, matrix: Array, load: Array, out: Array) -> None:
-    """Find p into out, (n,); matrix: G, (n, n) in rows, load: c, (n,). Arrays or pointers."""
+def complementary(n: int, matrix: Array, load: Array, touches: Array, out: Array) -> None:
+    """Find p into out, (n,); matrix: G, (n, n) in rows, load: c, touches: not zero of forces that may be, (n,).
+
+    Arrays or pointers.
+    """
     active, trial, size = np.zeros(n), np.zeros(n), 0.0
     for i in range(n):
         out[i] = 0.0
@@ -54,7 +57,7 @@ def complementary(n: int, matrix: Array, load: Array, out: Array) -> None:
             slope = load[i]
             for j in range(n):
                 slope += matrix[i * n + j] * out[j]
-            if active[i] == 0.0 and slope < most:
+            if touches[i] != 0.0 and active[i] == 0.0 and slope < most:
                 most, chosen = slope, i
         if chosen < 0:
             return

@@ -1,0 +1,177 @@
+"""Contacts of a scene: stops of hinges and sliders, ropes and struts, dry friction that sticks, pairs of surfaces."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from shoal.errors import InputError
+from shoal.mechanics.affine import Affine
+from shoal.mechanics.assembly.coordinates import Placement
+from shoal.mechanics.assembly.loads import ElementForceLaw, Measures
+from shoal.mechanics.derived import RowAllocator
+from shoal.mechanics.forces import DISTANCE, PLACE
+from shoal.mechanics.frames import RigidFrame
+from shoal.mechanics.gaps import DRY, LIMIT, PAIR, Gaps
+from shoal.mechanics.numerics.tile import Number, index, stacked
+from shoal.mechanics.pairs import FLAT, HOLE, ROUND, Pairs
+from shoal.mechanics.reach import span
+from shoal.scene import GROUND, Contact, ContactSurface, Distance, PointMass, Revolute, Scene, Slider
+
+RESOLUTION = 1e-12
+"""Gaps below this part of the machine's size, or below it in rad, are closed: a thousand times round-off."""
+BEYOND = 1e-6
+"""Starts farther beyond a limit than this part of the machine's size, or than this in rad, are none."""
+LOWER, UPPER = 1.0, -1.0
+
+
+class Contacts(Measures):
+    """Contacts in the order of the arrays of `gaps.Gaps`; limits are the natural values of measures without force."""
+
+    def __init__(self, scene: Scene, placement: Placement, rows: RowAllocator) -> None:
+        super().__init__(scene, placement, rows, 0.0)
+        self.beyond: Any = np.zeros(1, dtype=bool)
+        """Which lanes start beyond a limit, (lanes,) or (1,)."""
+        self.fields: list[str] = []
+        """What states each contact."""
+        self._each: list[tuple[int, int]] = []
+        """Kind and number of each contact."""
+        self._numbers: list[tuple[Number, ...]] = []
+        """Sign, restitution, tangential restitution, mu, mu_static and given friction of each contact."""
+        self._rolls: list[bool] = []
+        self._pairs: list[tuple[int, list[int], list[int], Number, Number]] = []
+        """Shape, turning sides, rows, radius and reach of each pair of surfaces."""
+        for name, joint in scene.joints.items():
+            if isinstance(joint, Revolute | Slider):
+                self._stops(name, joint)
+            elif isinstance(joint, Distance) and joint.keeps != "exactly":
+                self._rope(name, joint)
+        for name, joint in scene.joints.items():
+            if isinstance(joint, Revolute | Slider) and joint.stick == "exact":
+                self._dry(name, joint)
+        for name, contact in scene.contacts.items():
+            self._pair(name, contact)
+
+    def gaps(self) -> Gaps:
+        """Return the contacts as arrays."""
+        size, rubs = len(self._each), [self._is_rough(k) for k in range(len(self._each))]
+        shapes, turns, rows, radii, reaches = zip(*self._pairs, strict=True) if self._pairs else ((),) * 5
+        pairs = Pairs(
+            self.scene.dimensions, len(self._pairs), index(shapes), index(turns).ravel(), index(rows).ravel(),
+            stacked(radii), stacked(reaches),
+        )  # fmt: skip
+        numbers = [stacked(part) for part in zip(*self._numbers, strict=True)] if size else [stacked(())] * 6
+        return Gaps(
+            size,
+            self.scene.dimensions - 1 if any(rubs) else 0,
+            index([kind for kind, _ in self._each]),
+            index([number for _, number in self._each]),
+            index(rubs),
+            index(self._rolls),
+            self.forces(),
+            pairs,
+            *numbers,
+            RESOLUTION * float(np.max(span(self.scene))) if size else 0.0,
+        )
+
+    def _is_rough(self, k: int) -> bool:
+        return self._each[k][0] == DRY or self._rolls[k] or bool(np.any(self._numbers[k][4]))
+
+    def _add(
+        self, field: str, kind: int, number: int, sign: float, *, restitution: Number = 0.0,
+        tangential: Number = 0.0, mu: Number = 0.0, mu_static: Number = 0.0, given: Number = 0.0, rolls: bool = False,
+    ) -> None:  # fmt: skip
+        self.fields.append(field)
+        self._each.append((kind, number))
+        self._numbers.append((sign, restitution, tangential, mu, mu_static, given))
+        self._rolls.append(rolls)
+
+    def _limit(self, field: str, side: str, place: Number, sign: float, limit: Number, restitution: Number) -> None:
+        """Limit the last measure on one side; place: where it is at the start [rad or m]."""
+        self._add(field, LIMIT, len(self.kinds) - 1, sign, restitution=restitution)
+        where = ".".join(filter(None, (field, side)))
+        self._check(where, place, limit, sign)
+
+    def _check(self, where: str, place: Number, limit: Number, sign: float) -> None:
+        """Keep which lanes start beyond a limit. Raises InputError where a scene without lanes does."""
+        beyond = np.ravel(sign * (np.asarray(place) - limit) < -BEYOND * np.max(span(self.scene)))
+        if len(beyond) == 1 and beyond[0]:
+            start, stop = float(np.ravel(place)[0]), float(np.ravel(limit)[0])
+            raise InputError(f"{where}: the machine starts beyond this limit, at {start:.6g} where it is {stop:.6g}")
+        self.beyond = self.beyond | beyond
+
+    def _stops(self, name: str, joint: Revolute | Slider) -> None:
+        """Limit the free motion of a joint."""
+        for field, sign in (("min", LOWER), ("max", UPPER)):
+            limit = None if joint.stops is None else getattr(joint.stops, field)
+            if joint.stops is not None and limit is not None:
+                place = self._free_motion(name, joint, limit)
+                self._limit(f"joints.{name}.stops", field, place, sign, limit, joint.stops.restitution)
+
+    def _dry(self, name: str, joint: Revolute | Slider) -> None:
+        """Let a joint stick by dry friction of a given force."""
+        self._free_motion(name, joint, 0.0)
+        self._add(f"joints.{name}.coulomb", DRY, len(self.kinds) - 1, 1.0, mu_static=1.0, given=joint.coulomb)
+
+    def _free_motion(self, name: str, joint: Revolute | Slider, limit: Number) -> Number:
+        """Measure the free motion of a joint; returns where it is at the start [rad or m]."""
+        law = ElementForceLaw(natural=limit)
+        if isinstance(joint, Revolute):
+            self._angle(name, joint.first, joint.second, law, joint.axis)
+            return self.angles[-1]
+        line = self.placement.line(joint.first, joint.direction if joint.axis is None else joint.axis)
+        ends = [self.placement.point(self.scene, side) for side in (joint.first, joint.second)]
+        self._measure(name, PLACE, [*ends, line], law, 0.0)
+        first, second, along = (self.placement.start_of(one)[0] for one in (*ends, line))
+        return np.asarray(sum((second - first) * along) / np.sqrt(sum(along**2)))
+
+    def _rope(self, name: str, joint: Distance) -> None:
+        """Limit a distance."""
+        ends = [self.placement.point(self.scene, side) for side in (joint.first, joint.second)]
+        first, second = (self.placement.start_of(end)[0] for end in ends)
+        start = np.sqrt(sum((second - first) ** 2))
+        limit = start if joint.length is None or joint.length.number is None else joint.length.number
+        self._measure(name, DISTANCE, ends, ElementForceLaw(natural=limit), 0.0)
+        sign = UPPER if joint.keeps == "at-most" else LOWER
+        self._limit(f"joints.{name}.keeps", "", start, sign, limit, joint.restitution)
+
+    def _pair(self, name: str, contact: Contact) -> None:
+        """Let two surfaces touch."""
+        first, second = contact.first, contact.second
+        places = [self.placement.point(self.scene, side) for side in (first, second)]
+        shape = {"hole": HOLE, "round": ROUND}.get(second.shape, FLAT)
+        normal = places[0]
+        if shape == FLAT:
+            normal = self.placement.line(second, second.line + math.pi / 2 if second.plane is None else second.plane)
+        rows, turns = [], []
+        for side, place in zip((first, second), places, strict=True):
+            directors = self._directors(side) if contact.rubs or shape == FLAT else []
+            turns.append(bool(directors))
+            rows += [place, *(directors or [place] * (1 if self.scene.dimensions == 2 else 3))]
+        reach = second.radius if second.hole is None else second.hole
+        self._pairs.append((shape, turns, self.rows.of_all([*rows, normal]), first.radius, reach))
+        static = contact.mu if contact.mu_static is None else contact.mu_static
+        self._add(
+            f"contacts.{name}", PAIR, len(self._pairs) - 1, 1.0, restitution=contact.restitution,
+            tangential=contact.tangential_restitution, mu=contact.mu, mu_static=static, rolls=contact.rolling,
+        )  # fmt: skip
+        self._check(f"contacts.{name}", self._start_gap(shape, places, normal, first.radius, reach), 0.0, LOWER)
+
+    def _directors(self, side: ContactSurface) -> list[Affine]:
+        """Return vectors that turn with a body; none for the ground, point masses, and rods, which touch at a point."""
+        if side.body == GROUND or isinstance(self.scene.bodies[side.body], PointMass):
+            return []
+        frame = self.placement.frames[side.body]
+        if not isinstance(frame, RigidFrame):
+            return []
+        return [frame.directors[0]] if self.scene.dimensions == 2 else list(frame.directors)
+
+    def _start_gap(self, shape: int, places: list[Affine], normal: Affine, radius: Number, reach: Number) -> Number:
+        """Return the gap at the start [m]."""
+        first, second, n = (self.placement.start_of(one)[0] for one in (*places, normal))
+        if shape == FLAT:
+            return sum((first - second) * n) / np.sqrt(sum(n**2)) - radius
+        apart = np.sqrt(sum((first - second) ** 2))
+        return reach - radius - apart if shape == HOLE else apart - radius - reach

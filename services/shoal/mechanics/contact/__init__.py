@@ -1,0 +1,1 @@
+"""Unilateral constraints: gaps, forces of contact, impacts, stick and slip, location of their events."""

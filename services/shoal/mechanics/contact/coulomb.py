@@ -1,0 +1,315 @@
+"""Contacts with friction by Coulomb's law: forces p and the rates G p + c that they leave, of a few contacts.
+
+Normal: p >= 0, G p + c >= 0, one of them zero. Tangents: |p_T| <= mu p_N + given; where the rate along them is not zero
+|p_T| is that large and against it. G = W M^-1 W' is that of all directions, so that one problem serves accelerations,
+whose slip may be known, and impacts. Not convex: for large mu there may be no solution or several (Painleve 1895).
+Block Gauss-Seidel iteration, each contact exactly in its turn (Jean 1999), then the equations of the modes that it
+leaves.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from shoal.mechanics.gaps import DRY, SLIP, STICK, Gaps
+from shoal.mechanics.numerics.tile import Array
+
+OPEN, KNOWN = 0.0, 3.0
+"""Modes beside STICK and SLIP: open, and slip whose direction is known before."""
+FINE, NO_FORCE, SEVERAL, UNDECIDED = 0, 1, 2, 3
+"""Outcomes: found; Painleve's paradox, no force or several; the iteration has not ended."""
+TROUBLES = 8
+"""By which outcomes are counted on: the number of the contact, times this, is added to its outcome."""
+SWEEPS = 20_000
+SETTLED = 1e-15
+"""Change in a sweep, over the largest force, that ends the iteration."""
+DEPENDENT = 1e-11
+"""Pivot, over the largest entry, below which a direction depends on others: its force is zero."""
+ANGLES = 32
+"""Directions of slip in space that are tried, between which the one is bracketed."""
+
+
+@njit(cache=True, error_model="numpy")
+def solve(n: int, matrix: Array, load: Array, out: Array) -> None:
+    """Solve A x = load of consistent equations, with x = 0 where they leave it open; (n, n) in rows. Destroys both.
+
+    Gauss's elimination with complete pivoting of the rows and columns scaled to 1.
+    """
+    scale, order, rank = np.ones(n), np.arange(n), 0
+    for turn in range(2):
+        for i in range(n):
+            largest = 0.0
+            for j in range(n):
+                largest = max(largest, abs(matrix[i * n + j] if turn == 0 else matrix[j * n + i]))
+            largest = 1.0 / largest if largest > 0.0 else 1.0
+            for j in range(n):
+                matrix[i * n + j if turn == 0 else j * n + i] *= largest
+            if turn == 0:
+                load[i] *= largest
+            else:
+                scale[i] = largest
+    for k in range(n):
+        best, row, column = DEPENDENT, -1, -1
+        for i in range(k, n):
+            for j in range(k, n):
+                if abs(matrix[i * n + j]) > best:
+                    best, row, column = abs(matrix[i * n + j]), i, j
+        if row < 0:
+            break
+        for j in range(n):
+            matrix[k * n + j], matrix[row * n + j] = matrix[row * n + j], matrix[k * n + j]
+        load[k], load[row] = load[row], load[k]
+        for i in range(n):
+            matrix[i * n + k], matrix[i * n + column] = matrix[i * n + column], matrix[i * n + k]
+        order[k], order[column] = order[column], order[k]
+        for i in range(k + 1, n):
+            factor = matrix[i * n + k] / matrix[k * n + k]
+            if factor != 0.0:
+                for j in range(k, n):
+                    matrix[i * n + j] -= factor * matrix[k * n + j]
+                load[i] -= factor * load[k]
+        rank = k + 1
+    for i in range(n):
+        out[i] = 0.0
+    for k in range(rank - 1, -1, -1):
+        total = load[k]
+        for j in range(k + 1, rank):
+            total -= matrix[k * n + j] * out[order[j]]
+        out[order[k]] = total / matrix[k * n + k]
+    for i in range(n):
+        out[i] *= scale[i]
+
+
+@njit(cache=True, error_model="numpy")
+def hold(gaps: Gaps, width: int, lane: int, mode: Array, way: Array, matrix: Array, load: Array, out: Array) -> None:
+    """Find the forces p of contacts whose modes are known: their rates G p + c vanish but for slip.
+
+    mode: by contact; way: direction of slip in the tangents, by direction; load: c.
+    """
+    ways = 1 + gaps.tangents
+    n = gaps.size * ways
+    equations, right = np.zeros(n * n), np.zeros(n)
+    for contact in range(gaps.size):
+        first, at = contact * ways, contact * width + lane
+        slips = mode[contact] == SLIP or mode[contact] == KNOWN
+        for k in range(ways):
+            row = first + k
+            if k > 0 and slips:
+                # p_T = -(mu p_N + given) u
+                equations[row * n + row] = 1.0
+                equations[row * n + first] = gaps.mu[at] * way[row]
+                right[row] = -gaps.given[at] * way[row]
+            elif is_unknown(gaps, contact, k, mode[contact]):
+                for j in range(n):
+                    equations[row * n + j] = matrix[row * n + j]
+                right[row] = -load[row]
+            else:
+                equations[row * n + row] = 1.0
+    solve(n, equations, right, out)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def is_unknown(gaps: Gaps, contact: int, k: int, mode: float) -> bool:
+    """Return whether the force along a direction follows from the rate that it is to make vanish."""
+    if mode == OPEN:
+        return False
+    if k == 0:
+        return gaps.kind[contact] != DRY  # type: ignore[no-any-return]
+    return mode == STICK and gaps.rubs[contact] > 0 and (k == 1 or gaps.kind[contact] != DRY)  # type: ignore[no-any-return]
+
+
+@njit(cache=True, error_model="numpy")
+def decide(
+    gaps: Gaps, width: int, lane: int, mode: Array, way: Array, matrix: Array, load: Array, out: Array, impulsive: bool
+) -> int:
+    """Find modes and forces of contacts at once; returns the outcome.
+
+    mode: OPEN of those to be left out, KNOWN of those whose slip is known, with its direction in way; any other of
+    those to be decided. Replaces modes and ways by those that hold. impulsive: whether these are impulses, of which
+    given friction has none.
+    """
+    ways = 1 + gaps.tangents
+    n = gaps.size * ways
+    rest, begun, asked = np.zeros(n), np.zeros(n), np.zeros(gaps.size)
+    outcome, change, largest = FINE, np.inf, 0.0
+    for contact in range(gaps.size):
+        asked[contact] = mode[contact]
+    for i in range(n):
+        out[i] = 0.0
+    for _ in range(SWEEPS):
+        largest, change, outcome = 0.0, 0.0, FINE
+        for contact in range(gaps.size):
+            if asked[contact] == OPEN:
+                continue
+            first = contact * ways
+            for k in range(ways):
+                row = first + k
+                rest[row], begun[row] = load[row], out[row]
+                for j in range(n):
+                    if j < first or j >= first + ways:
+                        rest[row] += matrix[row * n + j] * out[j]
+            found = _alone(gaps, contact, width, lane, asked[contact], mode, way, matrix, rest, out, impulsive)
+            if found > outcome % TROUBLES:
+                outcome = found + TROUBLES * contact
+            for row in range(first, first + ways):
+                change, largest = max(change, abs(out[row] - begun[row])), max(largest, abs(out[row]))
+        if change <= SETTLED * largest:
+            break
+    if outcome != FINE:
+        return outcome
+    if change > 0.0:
+        hold(gaps, width, lane, mode, way, matrix, load, begun)
+        if _agrees(gaps, width, lane, mode, begun):
+            for i in range(n):
+                out[i] = begun[i]
+            return FINE
+    return FINE if change <= 1e-9 * largest else UNDECIDED
+
+
+@njit(cache=True, error_model="numpy")
+def _agrees(gaps: Gaps, width: int, lane: int, mode: Array, p: Array) -> bool:
+    """Return whether forces of contacts with these modes keep the limits of friction."""
+    ways = 1 + gaps.tangents
+    for contact in range(gaps.size):
+        first, square = contact * ways, 0.0
+        if mode[contact] != OPEN and p[first] < 0.0:
+            return False
+        for k in range(1, ways):
+            square += p[first + k] ** 2
+        if mode[contact] == STICK and np.sqrt(square) > limit(gaps, contact, width, lane, p[first], True):
+            return False
+    return True
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def limit(gaps: Gaps, contact: int, width: int, lane: int, normal: float, static: bool) -> float:
+    """Return the limit of friction under a normal force [N]."""
+    at = contact * width + lane
+    if gaps.rolls[contact] > 0:
+        return np.inf
+    return (gaps.mu_static[at] if static else gaps.mu[at]) * normal + gaps.given[at]  # type: ignore[no-any-return]
+
+
+@njit(cache=True, error_model="numpy")
+def _alone(
+    gaps: Gaps, contact: int, width: int, lane: int, asked: float, mode: Array, way: Array, matrix: Array, rest: Array,
+    out: Array, impulsive: bool,
+) -> int:  # fmt: skip
+    """Decide one contact exactly, with the rates that the others leave; returns the outcome."""
+    ways, at = 1 + gaps.tangents, contact * width + lane
+    n, first = gaps.size * ways, contact * ways
+    for k in range(ways):
+        out[first + k] = 0.0
+    if gaps.kind[contact] == DRY:
+        if impulsive:
+            mode[contact] = STICK
+            return FINE
+        row, given = first + 1, gaps.given[at]
+        if asked != KNOWN:
+            push = -rest[row] / matrix[row * n + row]
+            mode[contact] = STICK
+            if abs(push) <= given:
+                out[row] = push
+                return FINE
+            mode[contact], way[row] = SLIP, -np.sign(push)
+        out[row] = -given * way[row]
+        return FINE
+    normal, own = rest[first], matrix[first * n + first]
+    mode[contact] = KNOWN if asked == KNOWN else STICK
+    if gaps.rubs[contact] == 0:
+        mode[contact] = STICK if normal < 0.0 else OPEN
+        out[first] = max(0.0, -normal / own)
+        return FINE
+    if asked == KNOWN:
+        weight = own
+        for k in range(1, ways):
+            weight -= gaps.mu[at] * matrix[first * n + first + k] * way[first + k]
+        if weight <= 0.0:
+            return NO_FORCE if normal < 0.0 else SEVERAL
+        out[first] = max(0.0, -normal / weight)
+        for k in range(1, ways):
+            out[first + k] = -gaps.mu[at] * out[first] * way[first + k]
+        mode[contact] = KNOWN if normal < 0.0 else OPEN
+        return FINE
+    if normal >= 0.0:
+        mode[contact] = OPEN
+        return FINE
+    block, right, push = np.zeros(ways * ways), np.zeros(ways), np.zeros(ways)
+    for i in range(ways):
+        right[i] = -rest[first + i]
+        for j in range(ways):
+            block[i * ways + j] = matrix[(first + i) * n + first + j]
+    solve(ways, block, right, push)
+    tangential = np.sqrt(np.sum(push[1:] ** 2))
+    if push[0] >= 0.0 and tangential <= limit(gaps, contact, width, lane, push[0], True):
+        for k in range(ways):
+            out[first + k] = push[k]
+        return FINE
+    mode[contact] = SLIP
+    return _slip(gaps, contact, gaps.mu[at], push, matrix, rest, way, out)
+
+
+@njit(cache=True, error_model="numpy")
+def _slip(gaps: Gaps, contact: int, mu: float, push: Array, matrix: Array, rest: Array, way: Array, out: Array) -> int:
+    """Let a contact begin to slip: find the direction u of slip in which friction is against the rate that is left."""
+    ways = 1 + gaps.tangents
+    first = contact * ways
+    if ways == 2:
+        for side in (1.0, -1.0):
+            u = -side if push[1] > 0.0 else side
+            if _try(gaps, contact, mu, u, 0.0, matrix, rest, out)[1] >= 0.0 and out[first] > 0.0:
+                way[first + 1] = u
+                return FINE
+        return NO_FORCE
+    base = np.arctan2(-push[2], -push[1])
+    step, found = 2.0 * np.pi / ANGLES, False
+    low, across, _ = base, 0.0, 0.0
+    for turn in range(ANGLES + 1):
+        # Around the direction against the force of stick, on both sides in turn.
+        here = base + step * ((turn + 1) // 2) * (1.0 if turn % 2 else -1.0)
+        left, right = here - 0.5 * step, here + 0.5 * step
+        before, along = _try(gaps, contact, mu, np.cos(left), np.sin(left), matrix, rest, out)
+        after, further = _try(gaps, contact, mu, np.cos(right), np.sin(right), matrix, rest, out)
+        if before * after <= 0.0 and (along > 0.0 or further > 0.0):
+            low, across, found = left, before, True
+            break
+    if not found:
+        return NO_FORCE
+    high = low + step
+    for _ in range(80):
+        middle = 0.5 * (low + high)
+        value, along = _try(gaps, contact, mu, np.cos(middle), np.sin(middle), matrix, rest, out)
+        if value * across > 0.0:
+            low, across = middle, value
+        else:
+            high = middle
+    u, v = np.cos(0.5 * (low + high)), np.sin(0.5 * (low + high))
+    _, along = _try(gaps, contact, mu, u, v, matrix, rest, out)
+    way[first + 1], way[first + 2] = u, v
+    return FINE if along > 0.0 and out[first] > 0.0 else NO_FORCE
+
+
+@njit(cache=True, error_model="numpy")
+def _try(
+    gaps: Gaps, contact: int, mu: float, u: float, v: float, matrix: Array, rest: Array, out: Array
+) -> tuple[float, float]:
+    """Return the parts of the rate across and along a direction of slip (u, v), with the force that it brings in out.
+
+    In the plane v is zero. The normal rate is zero.
+    """
+    ways = 1 + gaps.tangents
+    n, first = gaps.size * ways, contact * ways
+    weight = matrix[first * n + first] - mu * matrix[first * n + first + 1] * u
+    if ways == 3:
+        weight -= mu * matrix[first * n + first + 2] * v
+    out[first] = -rest[first] / weight if weight > 0.0 else -1.0
+    out[first + 1] = -mu * out[first] * u
+    one, other = rest[first + 1], 0.0
+    if ways == 3:
+        out[first + 2], other = -mu * out[first] * v, rest[first + 2]
+    for j in range(ways):
+        one += matrix[(first + 1) * n + first + j] * out[first + j]
+        if ways == 3:
+            other += matrix[(first + 2) * n + first + j] * out[first + j]
+    return u * other - v * one, u * one + v * other

@@ -1,0 +1,357 @@
+"""Decisions at an event: impacts, then which contacts are closed, and which of those stick or slip.
+
+Of all accelerations with g_q a >= -bias for gaps with g = g' = 0 the true one deviates least from the free one (Gauss's
+principle with inequalities). An impact changes the rates by the least that brings g'+ + e g'- >= 0 (Moreau 1988).
+Friction is that of `coulomb`, of forces as of impulses.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from shoal.compile import function_pointers
+from shoal.mechanics.contact import complementarity, coulomb, motion, response
+from shoal.mechanics.contact.coulomb import FINE, KNOWN, OPEN, TROUBLES
+from shoal.mechanics.dynamics import ACCELERATION, Work
+from shoal.mechanics.gaps import DRY, LOGGED, SLIP, STICK
+from shoal.mechanics.model import Arrays
+from shoal.mechanics.numerics.tile import Array, Tile
+
+HIT, LIFT, SLIDE, STOP = 1.0, -1.0, 2.0, 3.0
+"""Events: a gap closes, a contact opens, one that sticks begins to slip, a slip ends."""
+KINDS = {HIT: "impact", LIFT: "opens", SLIDE: "slips", STOP: "sticks"}
+APART, TOUCHES, SEPARATES = 0.0, 1.0, 2.0
+"""States of a contact at an event."""
+PASSES = 10_000
+"""Impacts at one place in no time after which they are left as they are."""
+MOST = 100_000
+"""Events after which a motion is given up."""
+STILL = 1e-12
+"""Rate after an impact, over the largest before it, that is none."""
+TOO_MANY, GAINS = 4, 5
+"""Troubles beside the outcomes of `coulomb.decide`: more than `MOST` events; an impact that gains energy."""
+GAIN = 1e-9
+"""Energy gained by an impact, over the work of its impulses, that is round-off."""
+
+
+@njit(cache=True, error_model="numpy")
+def decide(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float) -> None:
+    """Decide on the lanes in which contacts are marked in w.gaps.hit.
+
+    Leaves the rates after the impacts in w.zdot, and the acceleration in w.a.
+    """
+    g, width, size = w.gaps, len(tile), m.gaps.size
+    state = np.zeros(size * width)
+    for at in range(size * width):
+        state[at] = TOUCHES if g.hit[at] == HIT or g.closed[at] != 0.0 or g.value[at] <= m.gaps.resolution else APART
+        if g.hit[at] == LIFT:
+            log(m, w, t, at // width, width, at % width, LIFT, 0.0)
+    _strike(tile, m, w, t, tolerance, state)
+    for _ in range(2 * size + 2):
+        _resolve(tile, m, w, t, tolerance, state)
+        again = False
+        for at in range(size * width):
+            g.hit[at] = 0.0
+            state[at] = TOUCHES if g.closed[at] != 0.0 else APART
+            if g.closed[at] == 0.0:
+                continue
+            # Round-off may leave a force or a friction beyond its limit: the event follows at once.
+            force = g.force[at // width * (1 + m.gaps.tangents) * width + at % width]
+            if m.gaps.kind[at // width] != DRY and force < 0.0:
+                g.hit[at], again = LIFT, True
+            elif m.gaps.rubs[at // width] > 0 and g.mode[at] == STICK and g.margin[at] < 0.0:
+                g.hit[at], again = SLIDE, True
+        if not again:
+            return
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _concerns(size: int, width: int, lane: int, hit: Array) -> bool:
+    found = False
+    for number in range(size):
+        found = found or hit[number * width + lane] != 0.0
+    return found
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _strikes(size: int, width: int, lane: int, hit: Array) -> bool:
+    """Return whether a gap of the lane has closed."""
+    found = False
+    for number in range(size):
+        found = found or hit[number * width + lane] == HIT
+    return found
+
+
+@njit(cache=True, error_model="numpy")
+def _struck(size: int, width: int, lane: int, hit: Array) -> int:
+    """Return the first contact of a lane whose gap has closed."""
+    found = 0
+    for number in range(size - 1, -1, -1):
+        found = number if hit[number * width + lane] == HIT else found
+    return found
+
+
+@njit(cache=True, error_model="numpy")
+def _release(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float, state: Array) -> None:
+    """Open all contacts of the lanes that are decided on; find the acceleration without them, and their responses."""
+    g, width, size = w.gaps, len(tile), m.gaps.size
+    for at in range(size * width):
+        if _concerns(size, width, at % width, g.hit):
+            g.closed[at] = 0.0
+    function_pointers.call(m.table.motion, (tile, m, w, t, w.z, w.zdot, tolerance, w.a, ACCELERATION))
+    response.respond(tile, m, w, t, w.z, w.zdot, tolerance, state)
+
+
+@njit(cache=True, error_model="numpy")
+def _strike(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float, state: Array) -> None:
+    """Let the contacts that touch strike each other, and mark those that separate.
+
+    A contact that would only hop below the resolution, v^2 / 2a, strikes without restitution: its accumulation of
+    impacts ends here, with all of its impulse. One that the others throw up so little is closed.
+    """
+    g, width, size, n = w.gaps, len(tile), m.gaps.size, m.unknowns
+    some = False
+    for lane in range(width):
+        some = some or _strikes(size, width, lane, g.hit)
+    if not some:
+        return
+    before, plastic, impulse = np.zeros(n * width), np.zeros(size * width), np.zeros(size * width)
+    for i in range(n * width):
+        before[i] = w.zdot[i]
+    closed, touching = np.zeros(size * width), state.copy()
+    for at in range(size * width):
+        closed[at] = g.closed[at]
+    for _ in range(size + 1):
+        for i in range(n * width):
+            w.zdot[i] = before[i]
+        for at in range(size * width):
+            state[at], g.closed[at] = touching[at], closed[at]
+        response.respond(tile, m, w, t, w.z, w.zdot, tolerance, state)
+        for lane in range(width):
+            if _strikes(size, width, lane, g.hit):
+                _impact(tile, m, w, t, lane, state, plastic, impulse)
+        _release(tile, m, w, t, tolerance, state)
+        lower = False
+        for lane in range(width):
+            if _strikes(size, width, lane, g.hit):
+                _choose(tile, m, w, t, lane, state)
+                for contact in range(size):
+                    at, first = contact * width + lane, contact * (1 + m.gaps.tangents)
+                    falling = -(g.load[first] + response.after(tile, m, w, first))
+                    low = falling > 0.0 and g.rate[at] ** 2 < 2.0 * falling * m.gaps.resolution
+                    if state[at] == SEPARATES and low:
+                        lower, plastic[at] = lower or plastic[at] == 0.0, 1.0
+                        state[at] = TOUCHES
+        if not lower:
+            break
+    for lane in range(width):
+        for contact in range(size):
+            at = contact * width + lane
+            meets = g.hit[at] == HIT and m.gaps.kind[contact] != DRY and t > 0.0
+            if meets or (closed[at] == 0.0 and impulse[at] > 0.0):
+                log(m, w, t, contact, width, lane, HIT, impulse[at])
+
+
+@njit(cache=True, error_model="numpy")
+def _resolve(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float, state: Array) -> None:
+    """Decide which contacts that touch are closed from here on, and find the acceleration."""
+    g, width, size = w.gaps, len(tile), m.gaps.size
+    before = np.zeros(size * width)
+    for at in range(size * width):
+        before[at] = g.mode[at]
+        if g.hit[at] == LIFT or state[at] == SEPARATES:
+            state[at] = APART
+        if g.hit[at] == SLIDE:
+            _head_against_force(m, w, at // width, width, at % width)
+    _release(tile, m, w, t, tolerance, state)
+    for lane in range(width):
+        if _concerns(size, width, lane, g.hit):
+            outcome = _choose(tile, m, w, t, lane, state)
+            if outcome != FINE:
+                _end(m, w, t, width, lane, outcome)
+            _close(tile, m, w, t, lane, before)
+    for at in range(size * width * (1 + m.gaps.tangents)):
+        g.force[at] = 0.0
+    motion.settle(tile, m, w, t, tolerance)
+    function_pointers.call(m.table.motion, (tile, m, w, t, w.z, w.zdot, tolerance, w.a, ACCELERATION))
+
+
+@njit(cache=True, error_model="numpy")
+def _impact(tile: Tile, m: Arrays, w: Work, t: float, lane: int, state: Array, plastic: Array, impulse: Array) -> None:
+    """Change the rates of one lane by the impulses of its contacts, and mark those that separate.
+
+    Contacts that an impact lets approach strike next, at the same place: of two that throw the body to and fro the
+    impacts may accumulate in no time at finite rates.
+    """
+    g, width, size, ways = w.gaps, len(tile), m.gaps.size, 1 + m.gaps.tangents
+    response.matrix(tile, m, w, lane, state)
+    fastest, rates, total = 0.0, np.zeros(size * ways), np.zeros(size * ways)
+    for contact in range(size):
+        at, first = contact * width + lane, contact * ways
+        impulse[at] = 0.0
+        if state[at] == APART:
+            continue
+        for k in range(ways):
+            rates[first + k] = g.rate[at] if k == 0 else g.slip[(first + k) * width + lane]
+            fastest = max(fastest, abs(rates[first + k]))
+    for turn in range(PASSES):
+        some = turn == 0
+        for contact in range(size):
+            at, first = contact * width + lane, contact * ways
+            member = state[at] != APART and rates[first] <= STILL * fastest
+            some = some or (member and m.gaps.kind[contact] != DRY and rates[first] < -STILL * fastest)
+            g.chosen[contact] = STICK if member else OPEN
+            restitution = 0.0 if plastic[at] != 0.0 else m.gaps.restitution[at]
+            for k in range(ways):
+                e = restitution if k == 0 else m.gaps.tangential[at]
+                g.load[first + k] = (1.0 + e) * rates[first + k] if member else 0.0
+        if not some:
+            break
+        if m.gaps.tangents == 0:
+            complementarity.complementary(size, g.matrix, g.load, g.chosen, g.found)
+        else:
+            outcome = coulomb.decide(m.gaps, width, lane, g.chosen, g.way, g.matrix, g.load, g.found, True)
+            if outcome != FINE:
+                _end(m, w, t, width, lane, outcome)
+                break
+        if _gains(m, w, rates):
+            _end(m, w, t, width, lane, GAINS + TROUBLES * _struck(size, width, lane, g.hit))
+            break
+        for direction in range(size * ways):
+            rates[direction] += response.after(tile, m, w, direction)
+            total[direction] += g.found[direction]
+    for direction in range(size * ways):
+        g.found[direction] = total[direction]
+    response.push(tile, m, w, lane, w.zdot)
+    for contact in range(size):
+        at = contact * width + lane
+        impulse[at] = total[contact * ways]
+        if state[at] != APART and m.gaps.kind[contact] != DRY and rates[contact * ways] > STILL * fastest:
+            state[at] = SEPARATES
+
+
+@njit(cache=True, error_model="numpy")
+def _gains(m: Arrays, w: Work, rates: Array) -> bool:
+    """Return whether impulses p do work p'(v + G p / 2) > 0: the law of the impact gains energy."""
+    size, work, whole = m.gaps.size * (1 + m.gaps.tangents), 0.0, 0.0
+    for i in range(size):
+        change = 0.0
+        for j in range(size):
+            change += 0.5 * w.gaps.matrix[i * size + j] * w.gaps.found[j]
+        work += w.gaps.found[i] * (rates[i] + change)
+        whole += abs(w.gaps.found[i]) * (abs(rates[i]) + abs(change))
+    return work > GAIN * whole
+
+
+@njit(cache=True, error_model="numpy")
+def _end(m: Arrays, w: Work, t: float, width: int, lane: int, trouble: int) -> None:
+    """End the motion of a lane, which is no number from here on."""
+    if w.gauss.ended[lane] < 0.0:
+        w.gauss.ended[lane], w.gauss.ended[2 * width + lane] = t, trouble
+    for i in range(lane, m.unknowns * width, width):
+        w.zdot[i] = np.nan
+
+
+@njit(cache=True, error_model="numpy")
+def log(m: Arrays, w: Work, t: float, contact: int, width: int, lane: int, kind: float, impulse: float) -> None:
+    """Count an event, and keep it if it is of the first lane."""
+    g = w.gaps
+    g.number[lane] += 1.0
+    count = int(g.number[lane])
+    if count > MOST:
+        _end(m, w, t, width, lane, TOO_MANY + TROUBLES * contact)
+    if lane == 0 and count <= LOGGED:
+        first = 4 * (count - 1)
+        g.log[first], g.log[first + 1], g.log[first + 2], g.log[first + 3] = t, contact, kind, impulse
+
+
+@njit(cache=True, error_model="numpy")
+def _choose(tile: Tile, m: Arrays, w: Work, t: float, lane: int, state: Array) -> int:
+    """Find forces of the contacts of a lane that touch, by the acceleration without them in w.a; returns the outcome.
+
+    Leaves the accelerations without them in w.gaps.load, and in w.gaps.chosen what they do.
+    """
+    g, width, size, ways = w.gaps, len(tile), m.gaps.size, 1 + m.gaps.tangents
+    response.matrix(tile, m, w, lane, state)
+    response.load_by(tile, m, w, lane, state, w.a)
+    for contact in range(size):
+        g.chosen[contact] = _asked(tile, m, w, lane, contact, state)
+    if m.gaps.tangents == 0:
+        complementarity.complementary(size, g.matrix, g.load, g.chosen, g.found)
+        return FINE
+    outcome = coulomb.decide(m.gaps, width, lane, g.chosen, g.way, g.matrix, g.load, g.found, False)
+    # A contact whose friction has reached its limit slips on as it pushes, unless that leads back at once.
+    returns = False
+    for contact in range(size):
+        if g.hit[contact * width + lane] == SLIDE and g.chosen[contact] == KNOWN:
+            along = 0.0
+            for row in range(contact * ways + 1, contact * ways + ways):
+                along += g.way[row] * (g.load[row] + response.after(tile, m, w, row))
+            returns = returns or along < 0.0
+    if returns:
+        for contact in range(size):
+            asked = _asked(tile, m, w, lane, contact, state)
+            slides = asked == KNOWN and g.hit[contact * width + lane] == SLIDE
+            g.chosen[contact] = STICK if slides else asked
+        outcome = coulomb.decide(m.gaps, width, lane, g.chosen, g.way, g.matrix, g.load, g.found, False)
+    return outcome  # type: ignore[no-any-return]
+
+
+@njit(cache=True, error_model="numpy")
+def _close(tile: Tile, m: Arrays, w: Work, t: float, lane: int, before: Array) -> None:
+    """Close the contacts of a lane that press, and keep what those that rub do from here on."""
+    g, width, ways = w.gaps, len(tile), 1 + m.gaps.tangents
+    for contact in range(m.gaps.size):
+        at, now = contact * width + lane, g.chosen[contact]
+        closed = m.gaps.kind[contact] == DRY or (now != OPEN and g.found[contact * ways] > 0.0)
+        g.closed[at] = 1.0 if closed else 0.0
+        if m.gaps.rubs[contact] == 0:
+            continue
+        g.mode[at] = (SLIP if now == KNOWN else now) if closed else OPEN
+        if m.gaps.kind[contact] == DRY and g.mode[at] == STICK and before[at] != STICK:
+            g.anchor[at] += g.value[at]
+        if g.mode[at] == SLIP:
+            response.head(m, w, contact, width, lane)
+        if closed and t > 0.0 and g.mode[at] != before[at]:
+            log(m, w, t, contact, width, lane, STOP if g.mode[at] == STICK else SLIDE, 0.0)
+
+
+@njit(cache=True, error_model="numpy")
+def _head_against_force(m: Arrays, w: Work, contact: int, width: int, lane: int) -> None:
+    """Let a contact that has stuck slip against its friction."""
+    g, ways, total = w.gaps, 1 + m.gaps.tangents, 0.0
+    for k in range(1, ways):
+        total += g.force[(contact * ways + k) * width + lane] ** 2
+    for k in range(1, ways):
+        g.way[contact * ways + k] = -g.force[(contact * ways + k) * width + lane] / np.sqrt(total)
+    response.head(m, w, contact, width, lane)
+
+
+@njit(cache=True, error_model="numpy")
+def _asked(tile: Tile, m: Arrays, w: Work, lane: int, contact: int, state: Array) -> float:
+    """Return what `coulomb.decide` is asked about a contact: OPEN, KNOWN with its direction in w.gaps.way, or STICK."""
+    g, width, ways = w.gaps, len(tile), 1 + m.gaps.tangents
+    at = contact * width + lane
+    if state[at] != TOUCHES:
+        return OPEN
+    if m.gaps.rubs[contact] == 0:
+        return STICK
+    fastest, square, push = 0.0, 0.0, 0.0
+    for i in range(lane, m.unknowns * width, width):
+        fastest = max(fastest, abs(w.zdot[i]))
+    for k in range(1, ways):
+        row = (contact * ways + k) * width + lane
+        square += g.slip[row] ** 2
+        push = max(push, abs(g.load[contact * ways + k]))
+    speed = np.sqrt(square)
+    if g.hit[at] == SLIDE:
+        response.along_heading(m, w, contact, width, lane)
+        return KNOWN
+    # A slip that ends is none below what its deceleration stops within the resolution.
+    least = np.sqrt(2.0 * push * m.gaps.resolution) if g.hit[at] == STOP else 0.0
+    if speed <= max(least, STILL * fastest):
+        return STICK
+    for k in range(1, ways):
+        g.way[contact * ways + k] = g.slip[(contact * ways + k) * width + lane] / speed
+    return KNOWN

@@ -1,0 +1,139 @@
+"""Accelerations with closed contacts, by Gauss's principle, and the removal of their drift.
+
+Between events each closed contact is held, sticks or slips as it did after the last one, so that its force follows from
+linear equations: the principle's for those that are held, Coulomb's for slip.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from shoal.mechanics.contact import complementarity, coulomb, response
+from shoal.mechanics.dynamics import Work
+from shoal.mechanics.gaps import DRY, SLIP, STICK
+from shoal.mechanics.model import Arrays
+from shoal.mechanics.numerics.tile import Array, Tile
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _some(tile: Tile, m: Arrays, flags: Array) -> bool:
+    found = False
+    for i in range(m.gaps.size * len(tile)):
+        found = found or flags[i] != 0.0
+    return found
+
+
+@njit(cache=True, error_model="numpy")
+def _hold(tile: Tile, m: Arrays, w: Work, lane: int) -> None:
+    """Find the forces of the closed contacts of a lane from w.gaps.matrix and load into found."""
+    g, width, size = w.gaps, len(tile), m.gaps.size
+    mode = np.zeros(size)
+    for contact in range(size):
+        at = contact * width + lane
+        if g.closed[at] != 0.0:
+            mode[contact] = g.mode[at] if m.gaps.rubs[contact] > 0 else STICK
+    if m.gaps.tangents == 0:
+        complementarity.solve(size, g.matrix, g.load, mode, g.found)
+    else:
+        coulomb.hold(m.gaps, width, lane, mode, g.way, g.matrix, g.load, g.found)
+
+
+@njit(cache=True, error_model="numpy")
+def accelerate(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, tolerance: float, a: Array) -> None:
+    """Add what the forces of closed contacts do to an acceleration that knows none of them."""
+    g, width, c, ways = w.gaps, len(tile), m.constraints.size, 1 + m.gaps.tangents
+    if not _some(tile, m, g.closed):
+        return
+    response.respond(tile, m, w, t, z, zdot, tolerance, g.closed)
+    for lane in range(width):
+        response.matrix(tile, m, w, lane, g.closed)
+        response.load_by(tile, m, w, lane, g.closed, a)
+        for contact in range(m.gaps.size):
+            if g.mode[contact * width + lane] == SLIP:
+                response.tangent_of(m, w, contact, width, lane)
+        _hold(tile, m, w, lane)
+        for direction in range(m.gaps.size * ways):
+            g.force[direction * width + lane] = g.found[direction]
+            for k in range(c):
+                more = g.found[direction] * g.reaction[((direction + 1) * c + k) * width + lane]
+                w.gauss.multiplier[k * width + lane] += more
+        response.push(tile, m, w, lane, a)
+        if m.gaps.tangents > 0:
+            _rub(tile, m, w, lane)
+
+
+@njit(cache=True, error_model="numpy")
+def _rub(tile: Tile, m: Arrays, w: Work, lane: int) -> None:
+    """The power that friction takes up, and what is left to its limit where it sticks."""
+    g, width, ways = w.gaps, len(tile), 1 + m.gaps.tangents
+    for contact in range(m.gaps.size):
+        at, first, square = contact * width + lane, contact * ways, 0.0
+        for k in range(1, ways):
+            square += g.found[first + k] ** 2
+            if g.mode[at] == SLIP:
+                w.power[lane] -= g.found[first + k] * g.slip[(first + k) * width + lane]
+        if g.mode[at] == STICK:
+            limit = coulomb.limit(m.gaps, contact, width, lane, g.found[first], True)
+            g.margin[at] = limit - np.sqrt(square)
+
+
+@njit(cache=True, error_model="numpy")
+def settle(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float) -> None:
+    """Take the drift of closed contacts out of places and rates, by the least change in the mass metric.
+
+    Of the places that along the normal and of joints that stick, of the rates that along all tangents that stick.
+    """
+    g, width, ways = w.gaps, len(tile), 1 + m.gaps.tangents
+    if not _some(tile, m, g.closed):
+        return
+    response.respond(tile, m, w, t, w.z, w.zdot, tolerance, g.closed)
+    held = np.zeros(m.gaps.size)
+    for lane in range(width):
+        response.matrix(tile, m, w, lane, g.closed)
+        for part in range(2):
+            for contact in range(m.gaps.size):
+                at, first = contact * width + lane, contact * ways
+                held[contact] = STICK if g.closed[at] != 0.0 else 0.0
+                if m.gaps.rubs[contact] > 0 and g.mode[at] == SLIP and m.gaps.kind[contact] == DRY:
+                    held[contact] = 0.0
+                for k in range(ways):
+                    g.load[first + k] = 0.0
+                    if held[contact] != 0.0 and _is_held(tile, m, w, contact, lane, k, part):
+                        rate = g.rate[at] if k == 0 else g.slip[(first + k) * width + lane]
+                        g.load[first + k] = g.value[at] if part == 0 else rate
+            if m.gaps.tangents == 0:
+                complementarity.solve(m.gaps.size, g.matrix, g.load, held, g.found)
+            else:
+                _settle_rubbing(tile, m, w, lane, held, part)
+            response.push(tile, m, w, lane, w.z if part == 0 else w.zdot)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _is_held(tile: Tile, m: Arrays, w: Work, contact: int, lane: int, k: int, part: int) -> bool:
+    """Return whether a closed contact holds its place (part 0) or its rate (1) along a direction.
+
+    Tangents of two surfaces have no place that could be held.
+    """
+    sticks = w.gaps.mode[contact * len(tile) + lane] == STICK
+    return k == 0 or (sticks and (part == 1 or m.gaps.kind[contact] == DRY))  # type: ignore[no-any-return]
+
+
+@njit(cache=True, error_model="numpy")
+def _settle_rubbing(tile: Tile, m: Arrays, w: Work, lane: int, held: Array, part: int) -> None:
+    """Find the changes along the directions that are held."""
+    g, ways = w.gaps, 1 + m.gaps.tangents
+    n = m.gaps.size * ways
+    equations, right = np.zeros(n * n), np.zeros(n)
+    for contact in range(m.gaps.size):
+        first = contact * ways
+        for k in range(ways):
+            row = first + k
+            known = _is_held(tile, m, w, contact, lane, k, part)
+            if known and coulomb.is_unknown(m.gaps, contact, k, held[contact]):
+                for j in range(n):
+                    equations[row * n + j] = g.matrix[row * n + j]
+                right[row] = -g.load[row]
+            else:
+                equations[row * n + row] = 1.0
+    coulomb.solve(n, equations, right, g.found)

@@ -1,0 +1,171 @@
+"""Pairs of surfaces: gap, normal, slip and their derivatives, from the places and attitudes of both bodies.
+
+With x from the second place to the first, n the normal from the second surface to the first and r the radius of the
+first, the surfaces touch at x - r n. Their rate along a direction u is u.(v + w x arm) of the first less that of the
+second: of the normal that is the rate of the gap, of a tangent the slip. What the accelerations do not cause of its
+derivative by time is found with complex numbers: of a function of z + i h z', h -> 0, the imaginary part is h times the
+rate (Squire and Trapp 1998).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from shoal.mechanics.numerics.tile import Array, Index
+
+FLAT, ROUND, HOLE = 0, 1, 2
+"""Shapes of the second surface: a line or plane, a circle or sphere (or a point), a hole."""
+_STEP = 1e-100
+MOST_ROWS = 27
+ROOM = 3 * (MOST_ROWS + 2) + 10
+"""Numbers that `describe` leaves of one pair in one lane."""
+
+
+class Pairs(NamedTuple):
+    """Pairs of surfaces of one tile.
+
+    dimensions: d, of vectors. shape: of the second surface. turns: whether the bodies of the first and the second have
+    an attitude, two a pair. rows: of each pair the place of the first and its directors (one in the plane, three in
+    space), the same of the second, and the normal of a flat surface; any valid rows where there are none. radius: of
+    the first, and reach: the second's radius or zero [m], both (pairs, lanes).
+    """
+
+    dimensions: int
+    size: int
+    shape: Index
+    turns: Index
+    rows: Index
+    radius: Array
+    reach: Array
+
+
+@njit(cache=True, forceinline=True)
+def side_rows(d: int) -> int:
+    """Rows of one side: place and directors."""
+    return 4 if d == 2 else 12
+
+
+@njit(cache=True, forceinline=True)
+def pair_rows(d: int) -> int:
+    """Rows of one pair."""
+    return 2 * side_rows(d) + d
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _vector(z, zdot, rows, first, d, width, lane):  # type: ignore[no-untyped-def]
+    """Return a vector of a state as complex numbers; in the plane with a third component of zero."""
+    a, b = rows[first] * width + lane, rows[first + 1] * width + lane
+    third = 0j
+    if d == 3:
+        c = rows[first + 2] * width + lane
+        third = complex(z[c], _STEP * zdot[c])
+    return complex(z[a], _STEP * zdot[a]), complex(z[b], _STEP * zdot[b]), third
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _dot(a, b):  # type: ignore[no-untyped-def]
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _cross(a, b):  # type: ignore[no-untyped-def]
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _along(a, s, b):  # type: ignore[no-untyped-def]
+    """a + s b."""
+    return a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _times(s, a):  # type: ignore[no-untyped-def]
+    return s * a[0], s * a[1], s * a[2]
+
+
+@njit(cache=True, error_model="numpy")
+def _tangents(d, n):  # type: ignore[no-untyped-def]
+    """Return two unit vectors across a normal; in the plane the normal turned by -90 degrees, and the axis."""
+    if d == 2:
+        return (n[1], -n[0], 0j), (0j, 0j, 1.0 + 0j)
+    x, y, z = abs(n[0].real), abs(n[1].real), abs(n[2].real)
+    axis = (1.0 + 0j, 0j, 0j)
+    if y <= x and y <= z:
+        axis = (0j, 1.0 + 0j, 0j)
+    elif z <= x and z <= y:
+        axis = (0j, 0j, 1.0 + 0j)
+    across = _cross(axis, n)
+    size = np.sqrt(_dot(across, across))
+    if size.real > 0.0:
+        across = _times(1.0 / size, across)
+    return across, _cross(n, across)
+
+
+@njit(cache=True, error_model="numpy")
+def _write(z, zdot, p, first, d, width, lane, sign, turns, u, arm, out, at):  # type: ignore[no-untyped-def]
+    """Write the gradient of the rate of a side along u in the rates of its rows; return rate + i h bias."""
+    total = 0j
+    for k in range(d):
+        value = sign * u[k]
+        out[at + k] = value.real
+        total += value * zdot[p.rows[first + k] * width + lane]
+    moment = _cross(arm, u)
+    for number in range(1 if d == 2 else 3):
+        row = first + d * (number + 1)
+        e = _vector(z, zdot, p.rows, row, d, width, lane)
+        # w = e x e' / e.e in the plane, 1/2 sum e x e' in space.
+        change = _cross(moment, e)
+        factor = complex(0.5 * sign if turns else 0.0, 0.0)
+        if turns and d == 2:
+            factor = sign / _dot(e, e)
+        for k in range(d):
+            value = factor * change[k]
+            out[at + d * (number + 1) + k] = value.real
+            total += value * zdot[p.rows[row + k] * width + lane]
+    return total
+
+
+@njit(cache=True, error_model="numpy")
+def describe(p: Pairs, number: int, width: int, lane: int, directions: int, z: Array, zdot: Array, out: Array) -> None:
+    """Describe a pair in one lane; derived rows of z and zdot must be filled. Pointers.
+
+    out: the gap [m] and, in three by three numbers, normal and tangents; then for each direction, the normal first, the
+    gradient of the rate in the rates of the pair's rows, the rate [m/s] and its bias [m/s^2].
+    """
+    d = p.dimensions
+    first, half, rows = pair_rows(d) * number, side_rows(d), pair_rows(d)
+    one = _vector(z, zdot, p.rows, first, d, width, lane)
+    other = _vector(z, zdot, p.rows, first + half, d, width, lane)
+    x = _along(one, -1.0, other)
+    radius, reach = p.radius[number * width + lane], p.reach[number * width + lane]
+    if p.shape[number] == FLAT:
+        n = _vector(z, zdot, p.rows, first + 2 * half, d, width, lane)
+        n = _times(1.0 / np.sqrt(_dot(n, n)), n)
+        gap = _dot(x, n).real - radius
+    else:
+        size = np.sqrt(_dot(x, x))
+        gap = size.real - radius - reach
+        n = (0j, 0j, 0j)
+        if size.real > 0.0:  # complex numbers cannot be divided by zero
+            n = _times(1.0 / size, x)
+        if p.shape[number] == HOLE:
+            gap, n = reach - radius - size.real, _times(-1.0 + 0j, n)
+    tangents = _tangents(d, n)
+    out[0] = gap
+    for k in range(3):
+        out[1 + k], out[4 + k], out[7 + k] = n[k].real, tangents[0][k].real, tangents[1][k].real
+    arm = _times(complex(-radius, 0.0), n)
+    far = _along(x, complex(-radius, 0.0), n)
+    for way in range(directions):
+        u = n if way == 0 else (tangents[0] if way == 1 else tangents[1])
+        at = 10 + way * (rows + 2)
+        total = _write(z, zdot, p, first, d, width, lane, 1.0, p.turns[2 * number] > 0, u, arm, out, at)
+        total += _write(
+            z, zdot, p, first + half, d, width, lane, -1.0, p.turns[2 * number + 1] > 0, u, far, out, at + half
+        )
+        for k in range(d):
+            out[at + 2 * half + k] = 0.0
+        out[at + rows], out[at + rows + 1] = total.real, total.imag / _STEP

@@ -1,0 +1,106 @@
+"""Contacts between bodies: what touches what, how it rebounds and how it rubs."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import BeforeValidator, Field, model_validator
+
+from shoal.scene.joints import Attachment, origin_of_ground
+from shoal.scene.record import Angle, Axis, NonNegative, Positive, Record
+
+SHAPES = ("line", "plane", "hole")
+
+
+class ContactSurface(Attachment):
+    """A place on a body and the surface around it: a point, a circle or sphere, a line, a plane or a hole."""
+
+    radius: NonNegative = 0.0
+    """Radius of a circle, in space of a sphere, about the place [m]; 0 of a point."""
+    line: Angle | None = None
+    """Angle [rad] in the body's frame of a line through the place, in the plane; the other body is on its left."""
+    plane: Axis | None = None
+    """Normal of a plane through the place, as it points at the start, in space; it leads to the other body [1]."""
+    hole: Positive | None = None
+    """Radius of a hole about the place, in space hollow sphere, in which the other body is [m]."""
+
+    @property
+    def shape(self) -> str:
+        """Return `line`, `plane` or `hole`, or `round` of a circle, a sphere or a point."""
+        return next((name for name in SHAPES if getattr(self, name) is not None), "round")
+
+    @model_validator(mode="after")
+    def _one_shape(self) -> ContactSurface:
+        stated = ["radius"] * bool(np.any(self.radius)) + [name for name in SHAPES if getattr(self, name) is not None]
+        if len(stated) > 1:
+            raise ValueError(f"{stated[1]}: {stated[0]} is stated as well; a surface has one shape")
+        return self
+
+
+Side = Annotated[ContactSurface, BeforeValidator(origin_of_ground)]
+
+
+class Contact(Record):
+    """Two surfaces that do not penetrate: they strike, rest, slide, stick and separate."""
+
+    first: Side
+    """A point, a circle or a sphere."""
+    second: Side
+    """The surface that it may touch."""
+    restitution: Annotated[float, Field(ge=0, le=1)] = 0.0
+    """Normal rate after an impact over that before [1] (Newton's law in the form of Moreau)."""
+    tangential_restitution: Annotated[float, Field(ge=0, le=1)] = 0.0
+    """Slip rate after an impact in which the surfaces stick over that before, with the opposite sign [1]."""
+    mu: NonNegative = 0.0
+    """Coefficient of friction by Coulomb's law, of slip [1]; below the limit the surfaces stick."""
+    mu_static: NonNegative | None = None
+    """Coefficient of the limit of stick [1]; by default `mu`."""
+    rolling: bool = False
+    """Whether the surfaces stick however large the force of friction has to be."""
+
+    @property
+    def rubs(self) -> bool:
+        """Return whether it has friction, in any lane."""
+        return self.rolling or bool(np.any(self.mu)) or bool(np.any(self.mu_static or 0.0))
+
+    @model_validator(mode="after")
+    def _two_surfaces(self) -> Contact:
+        if self.first.shape != "round":
+            raise ValueError(f"first.{self.first.shape}: the first side is a point or round; let this be the second")
+        if self.first.body == self.second.body:
+            raise ValueError(f"second.body: {self.second.body!r} is the first body as well; a contact needs two")
+        if self.second.shape == "round" and not np.all(np.add(self.first.radius, self.second.radius) > 0.0):
+            raise ValueError("second: is a point as the first side is; state a radius, a line, a plane or a hole")
+        if self.second.hole is not None and not np.all(self.second.hole > self.first.radius):
+            raise ValueError(
+                f"second.hole: must be larger than the radius of the first side, found {self.second.hole:g} and "
+                f"{self.first.radius:g}"
+            )
+        if self.mu_static is not None and np.any(self.mu_static < self.mu):
+            raise ValueError(f"mu_static: must be at least mu, found {self.mu_static:g} and {self.mu:g}")
+        return self
+
+
+def check_contacts(scene: Any) -> None:
+    """Raises ValueError where surfaces are of other dimensions than the scene, or of bodies that have none."""
+    for name, contact in scene.contacts.items():
+        wrong, right = ("line", "plane") if scene.dimensions == 3 else ("plane", "line")
+        if contact.second.shape == wrong:
+            where = f"contacts.{name}.second.{wrong}"
+            raise ValueError(f"{where}: with dimensions: {scene.dimensions} a flat surface is a {right}")
+        for field in ("first", "second"):
+            side = getattr(contact, field)
+            body = scene.bodies.get(side.body)
+            kind = getattr(body, "kind", "")
+            turns = kind == "rigid-body" or getattr(body, "element", "") == "rigid"
+            if body is None or turns:
+                continue
+            if side.shape in ("line", "plane"):
+                where = f"contacts.{name}.{field}.{side.shape}"
+                raise ValueError(f"{where}: {side.body} is no rigid body, which a flat surface needs")
+            if contact.rubs and kind != "point-mass" and np.any(side.radius or side.hole or 0.0):
+                raise ValueError(
+                    f"contacts.{name}.{field}: friction at a radius of {side.body}, which bends; weld a rigid body to "
+                    "it, or leave out mu"
+                )
