@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
+from numba import njit, typeof, types
 
 from shoal.compile import function_pointers, simd, structures
 from shoal.compile.pointers import pointer, raw, shift
@@ -99,6 +99,12 @@ def derived_rows(tile: Tile, arrays: Arrays, room: Work) -> None:
     """Fill all derived rows of the state in `room`. Arrays, not pointers."""
     _derived_rows(tile, arrays.derived, room.z, arrays.unknowns, arrays.rows, False)
     _derived_rows(tile, arrays.derived, room.zdot, arrays.unknowns, arrays.rows, True)
+
+
+def rows_kernel(tile: Tile, arrays: Arrays, room: Work) -> tuple[Any, tuple[Any, ...]]:
+    """Return the kernel of `derived_rows` with the types of its arguments."""
+    number = types.int64
+    return _derived_rows, (typeof(tile), typeof(arrays.derived), typeof(room.z), number, number, types.boolean)
 
 
 @njit(cache=True, error_model="numpy")

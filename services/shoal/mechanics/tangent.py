@@ -13,7 +13,7 @@ from shoal.compile.pointers import pointer, raw, raw_type, shift
 from shoal.compile.structures import Reference
 from shoal.compile.vector import add, add_product
 from shoal.mechanics import forces, kernels, saddle
-from shoal.mechanics.dynamics import Work, derived_rows, work_space
+from shoal.mechanics.dynamics import Work, derived_rows, rows_kernel, work_space
 from shoal.mechanics.elements.families import LAID
 from shoal.mechanics.model import Arrays, Model, scatter, seen
 from shoal.mechanics.numerics import sparse
@@ -286,7 +286,8 @@ def signatures(tile: Tile, arrays: Arrays, room: Work) -> list[kernels.Kernel]:
     of_family = _of_family, (lanes, number, *(rows,) * 4, number, types.boolean)
     of_forces = _of_forces, (lanes, springs, functions, rows, rows, rows, rows, number)
     of_dampers = _of_dampers, (lanes, springs, rows, rows, rows, rows, number)
-    return [of_family, of_forces, of_dampers] if len(tile) == 1 else [of_family, of_forces]
+    found = [rows_kernel(tile, arrays, room), of_family, of_forces]
+    return [*found, of_dampers] if len(tile) == 1 else found
 
 
 # These take the structures that they need and no others: a kernel takes seconds to compile that is handed them all.

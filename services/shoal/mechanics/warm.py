@@ -36,10 +36,6 @@ from shoal.mechanics.numerics.tile import SINGLE, tiles
 from shoal.mechanics.simulate import simulate
 from shoal.scene import Scene, load_scene
 
-USUAL = ("dop853", "rk4", "leapfrog", "generalized-alpha")
-"""Integrators that `auto` or people choose for most machines: their kernels in space are compiled ahead, those of
-others when they are first used."""
-
 
 class KernelSignature(NamedTuple):
     """A kernel by its name, and the types of its arguments."""
@@ -70,8 +66,8 @@ class KernelSignature(NamedTuple):
 def warm(integrators: Iterable[str] = tuple(INTEGRATORS), note: Note = lambda _: None, *, every: bool = True) -> float:
     """Compile kernels that the cache lacks, on all cores, and load them; return the time [s].
 
-    every: for any scene, with constraints and all families of elements, for statics, modes and reactions, and for usual
-    integrators in space too; else for planar cables that hang together. `note` takes lines of progress.
+    every: for any scene, with constraints and all families of elements, and for statics, modes and reactions; else for
+    planar cables that hang together. `note` takes lines of progress.
     """
     begin = time.perf_counter()
     runs = [(scene, lanes) for name in integrators for scene in _machines(name, every=every) for lanes in _lanes(name)]
@@ -150,12 +146,13 @@ def required(scene: Scene, lanes: int, *, every: bool = False) -> list[KernelSig
     with kernels.planned():
         settings = choose(scene.solver, model, tile, lane, name)
         scheme = connect(tile, settings, arrays, room)
+        steps = signatures(tile, settings, arrays, room)
+        if not facts(name).explicit:
+            steps.append(tangent.assembly(tile, arrays, room, tangent.tangent_tile(model, tile, lane)))
     stops = halting(scene.solver, model, name, scene.solver.duration)
     frame = framed(tile, scheme, arrays, room, 0.0, 0, np.zeros(1), model.marker_rows.ravel(), 0.0, stops)
-    found = [(loop, (frame_type(frame),)), *signatures(tile, settings, arrays, room)]
+    found = [(loop, (frame_type(frame),)), *steps]
     found += kernels.signatures(tile, arrays, room, every=every)
-    if not facts(name).explicit:
-        found.append(tangent.assembly(tile, arrays, room, tangent.tangent_tile(model, tile, lane)))
     if every:  # limits of stability
         found += tangent.signatures(tile, arrays, room)
     if every and tile == SINGLE:  # statics, modes and reactions
@@ -177,9 +174,9 @@ def _lanes(name: str) -> tuple[int, ...]:
 
 
 def _machines(integrator: str, *, every: bool) -> list[Scene]:
-    """Return a planar machine, and for usual integrators a spatial one, to compile the kernels of an integrator for."""
+    """Return a planar machine, and once a spatial one for its elements, to compile the kernels of an integrator for."""
     names = ["flexible-double-pendulum"]
-    if every and integrator in USUAL:
+    if every and integrator == "leapfrog":
         names.append("flexible-spherical-double-pendulum")
     return [load_scene(name).with_values({"solver.integrator": integrator, "solver.step": 2e-4}) for name in names]
 

@@ -14,7 +14,7 @@ from numba import njit, typeof, types
 from shoal.compile import function_pointers, structures
 from shoal.compile.pointers import pointer, raw_type, shift
 from shoal.compile.structures import Reference
-from shoal.mechanics import constraints, dynamics, kernels
+from shoal.mechanics import constraints, dynamics, functions, kernels
 from shoal.mechanics.derived import derive
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.model import Arrays, seen
@@ -79,7 +79,12 @@ def signatures(tile: Tile, arrays: Arrays, room: Work) -> list[kernels.Kernel]:
     """Return the kernels of all evaluations of a model, with the types of their arguments."""
     number, memory = types.float64, typeof(arrays.storage)
     called = _call, (types.int64, typeof(tile), memory, memory, number, number, typeof(_NOTHING))
-    return [called, *((one, _kinds(tile, arrays, room)) for one in (_look, _elastic, _accelerate, _stored, _remember))]
+    function = functions.evaluate, (typeof(arrays.functions), types.int64, number, types.int64)
+    return [
+        called,
+        function,
+        *((one, _kinds(tile, arrays, room)) for one in (_look, _elastic, _accelerate, _stored, _remember)),
+    ]
 
 
 def _run(
