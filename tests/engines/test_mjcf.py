@@ -227,6 +227,8 @@ BASE: dict[str, Any] = {
         ({"joints": {"P": {"first": end("A"), "second": {"body": "B"}, "stops": {"max": 3.0}}}},
          "joints.P.stops: not written as MJCF"),
         ({"joints": {"D": {"kind": "distance", "keeps": "at-most", **LOOP}}}, "joints.D.keeps: not written as MJCF"),
+        ({"contacts": {"C": {"first": end("B"), "second": {"body": "ground", "line": 0.0}}}},
+         "contacts.C: not written as MJCF"),
         ({"ground_points": {"P": {"x": "t"}}}, "ground_points.P: MJCF has no functions of time"),
     ],
 )  # fmt: skip

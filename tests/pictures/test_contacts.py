@@ -98,3 +98,21 @@ def test_the_page_and_the_terminal_say_what_happened() -> None:
     assert {*shown["stops"]} == {"shoulder", "elbow"}
     assert any(shown["slack"]["rope"])
     assert not all(shown["slack"]["rope"])
+
+
+def test_surfaces_of_contacts_are_drawn_and_impacts_are_those_of_the_bodies_that_touch() -> None:
+    balls = {name: {"kind": "rigid-body", "mass": 1.0, "inertia": 0.01} for name in ("low", "high")}
+    floor = {"first": {"body": "low", "radius": 0.1}, "second": {"body": "ground", "line": 0.0}, "restitution": 0.5}
+    scene = Scene.parse({
+        "name": "balls", "gravity": [0.0, -9.81], "bodies": balls, "contacts": {"floor": floor},
+        "markers": {name: {"body": name} for name in balls},
+        "initial": {"low": {"position": [0.0, 0.3]}, "high": {"position": [1.0, 0.5]}}, "solver": {"duration": 0.4},
+    })  # fmt: skip
+    moving = scene_motion(scene, get_engine("gauss"), 0.4)
+    assert [len(moving.struck[name]) for name in balls] == [len([e for e in moving.events if e["kind"] == "impact"]), 0]
+    circle, line = moving.stops["floor first"], moving.stops["floor second"]
+    away = np.linalg.norm(circle - moving.markers["low"][:, None], axis=2)
+    np.testing.assert_allclose(away, 0.1, atol=1e-12)
+    assert np.ptp(line[..., 1]) == 0.0
+    (said,) = told(get_engine("gauss").simulate(scene).model)
+    assert "the last event: floor" in said

@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
+from shoal.mechanics.event_record import place_of
 from shoal.mechanics.reach import span
 from shoal.pictures.links import At
 from shoal.pictures.outline import INSIDE
 from shoal.pictures.style import BLACK, GREEN, ORANGE, PURPLE, VERMILION
 from shoal.scene import GROUND, Attachment, Revolute, Rod, Scene, Slider
+from shoal.scene.contacts import ContactSurface
 from shoal.scene.joints import Distance, places
 from shoal.trajectory import Array
 
@@ -57,33 +59,28 @@ def mark_impacts(panel: Axes, times: Array, path: Array, hits: Array, label: str
 def struck(scene: Scene, events: Sequence[Event]) -> dict[str, Array]:
     """Return the times [s] at which impacts may change the rates of markers, by name.
 
-    They are impacts of joints of the machine that the marker's body is part of, of bodies that joints connect.
+    They are impacts of bodies that joints connect with that of the marker. Ropes, struts and contacts connect none.
     """
+    sides = {name: [side.body for side in places(joint)] for name, joint in scene.joints.items()}
+    touching = {name: [contact.first.body, contact.second.body] for name, contact in scene.contacts.items()}
     group = {name: name for name in scene.bodies}
-    owners: dict[str, str] = {}
-    for name, joint in scene.joints.items():
-        bodies = [side.body for side in places(joint) if side.body != GROUND]
-        if bodies:
-            owners[name] = bodies[0]
-        for body in bodies[1:]:
-            one, other = group[bodies[0]], group[body]
-            group = {key: one if root == other else root for key, root in group.items()}
+    for name, bodies in sides.items():
+        if getattr(scene.joints[name], "keeps", "exactly") == "exactly":
+            roots = {group[body] for body in bodies if body != GROUND}
+            group = {key: min(roots) if root in roots else root for key, root in group.items()}
+    groups = {name: {group.get(body) for body in bodies} for name, bodies in (sides | touching).items()}
     hits = [event for event in events if event["kind"] == "impact" and event["impulse"] > 0.0]
     return {
-        name: np.array([event["time"] for event in hits if _joined(event["joint"], at.body, owners, group)])
+        name: np.array([event["time"] for event in hits if group.get(at.body, "") in groups[place_of(event)]])
         for name, at in scene.markers.items()
     }
 
 
-def _joined(joint: str, body: str, owners: Mapping[str, str], group: Mapping[str, str]) -> bool:
-    return body != GROUND and joint in owners and group[owners[joint]] == group[body]
+class Limits:
+    """The stops and the surfaces of contacts of a scene in the plane, with the markers that they are drawn by.
 
-
-class Stops:
-    """The stops of a scene in the plane, with the markers that they are drawn by.
-
-    That of a hinge is the arc of its range about the joint, beside the first body; that of a slider a tick across it.
-    Bodies that bend show none, as they have no axes of their own at a joint.
+    A stop of a hinge is the arc of its range about the joint, beside the first body; one of a slider a tick across it.
+    Bodies that bend show none, as they have no axes of their own at a joint. Surfaces are circles and lines.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -96,6 +93,10 @@ class Stops:
                 ends = [joint.stops.min, joint.stops.max]
                 lines = self._arc(ends) if isinstance(joint, Revolute) else self._ticks(ends, joint)
                 self._drawn[name] = self._carried(joint.first, lines)
+        for name, contact in scene.contacts.items() if scene.dimensions == 2 else ():
+            for field, side in (("first", contact.first), ("second", contact.second)):
+                if (outline := self._surface(side)) is not None and self._has_axes(side):
+                    self._drawn[f"{name} {field}"] = self._carried(side, outline)
 
     def shown(self, at: At, frames: int) -> dict[str, Array]:
         """Return lines by joint [m], nan between them, (frames, points, 2)."""
@@ -118,6 +119,14 @@ class Stops:
         ways = [np.array([[np.cos(end), np.sin(end)]]) for end in limits]
         ticks = [part for way in ways for part in (gap, (RADIUS - TICK) * way, (RADIUS + 2 * TICK) * way)]
         return self._size * np.concatenate([arc, *ticks])
+
+    def _surface(self, side: ContactSurface) -> Array | None:
+        """Return a circle about the place of a surface, or a line through it [m], (points, 2); None of a point."""
+        if side.line is not None:
+            return self._size * np.array([[-1.0], [1.0]]) * [np.cos(side.line), np.sin(side.line)]
+        angle = np.linspace(0.0, 2.0 * np.pi, 2 * ARC)
+        radius = side.radius if side.hole is None else side.hole
+        return radius * np.stack([np.cos(angle), np.sin(angle)], axis=1) if radius else None
 
     def _ticks(self, ends: list[float | None], joint: Slider) -> Array:
         """Return ticks across the line of a slider, from its place [m], (points, 2)."""

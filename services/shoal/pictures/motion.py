@@ -11,7 +11,7 @@ import numpy as np
 from shoal.engines.contract import Engine
 from shoal.errors import ComputationError, InputError
 from shoal.json_values import plain
-from shoal.pictures.contacts import Stops, slack, struck
+from shoal.pictures.contacts import Limits, slack, struck
 from shoal.pictures.links import At, Links
 from shoal.pictures.outline import ground, outlined
 from shoal.pictures.solids import Bar, MarkedScene
@@ -34,7 +34,7 @@ class DrawnMotion:
     measured: places [m], (frames, d), nan where none was measured near that time; directions: measured angles [rad]
     behind: outlines of another machine that is drawn below [m], (frames, points, d)
     links: places that a spring or a distance joins [m], (frames, 2, d); slack: when ropes and struts hold nothing,
-    (frames,); stops: lines of limits at their joints in the plane [m], (frames, points, 2), nan between them
+    (frames,); stops: lines of limits and surfaces in the plane [m], (frames, points, 2), nan between them
     events: of contacts, as `model["events"]` has them; struck: times of impacts, by marker [s]
     In space: bars of bodies; axes of joints: a point [m] and a direction, (frames, 2, 3); up: the direction against
     gravity, along an axis, (3,).
@@ -137,7 +137,7 @@ def traced_out(scene: Scene) -> tuple[Scene, Callable[[At, Array], dict[str, Any
     These are the paths of a marker by its name [m], (frames, d), and the times of the motion [s], (frames,).
     """
     traced, points = outlined(scene)
-    links, stops = Links(scene), Stops(scene)
+    links, stops = Links(scene), Limits(scene)
     solids = MarkedScene(traced, points, scene) if scene.dimensions == 3 else None
     data = (traced if solids is None else solids.scene).model_dump(mode="json")
     data["markers"] |= links.markers | stops.markers

@@ -35,6 +35,8 @@ def require_counterparts(scene: Scene) -> None:
         raise InputError("initial.from: MJCF states a start; it has neither statics nor other runs")
     for name in scene.ground_points:
         raise InputError(f"ground_points.{name}: MJCF has no functions of time")
+    for name in scene.contacts:
+        raise InputError(f"contacts.{name}: not written as MJCF; there contacts give way, and its friction creeps")
     for name, joint in scene.joints.items():
         if joint.kind == "gear":
             raise InputError(f"joints.{name}: a gear is not written as MJCF; there its teeth would give way")
