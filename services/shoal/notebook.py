@@ -122,9 +122,9 @@ def prepare(asked: OfScene) -> Prepared:
         >>> prepared({"initial.OA.angle": 0.3}, [0.5]).ok
         True
     """
-    from shoal.engines.prepared import Prepared
+    from shoal.engines.prepared import prepared
 
-    return Prepared(machine(asked))
+    return prepared(machine(asked))
 
 
 @function(Select)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -40,7 +39,7 @@ class Prepared:
         self._checked: dict[tuple[str, tuple[int, ...], bytes], Array] = {}
         self._set: dict[str, Prepared] = {}
 
-    @cached_property
+    @property
     def scene(self) -> Scene:
         """A copy of the scene, as scenes of equal content share what is kept."""
         return self._scene.model_copy(deep=True)
