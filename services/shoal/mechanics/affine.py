@@ -10,12 +10,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from shoal.mechanics import plane
 from shoal.mechanics.numerics.tile import Array, Index, Number
+
+if TYPE_CHECKING:
+    import scipy.sparse
 
 NEGLIGIBLE = 1e-12
 """Coefficients of unit vectors, and places in parts of the machine's size, that are round-off: some thousand eps."""
@@ -104,15 +108,25 @@ def combined(vectors: tuple[Affine, ...], factors: tuple[Number, ...]) -> Affine
     return total
 
 
-class Points(NamedTuple):
-    """Vectors that are affine in the coordinates: matrix (vectors, d, unknowns) and constant (vectors, d)."""
+@dataclass(frozen=True)
+class Points:
+    """Vectors that are affine in the coordinates: sparse rows (vectors * d, unknowns) and constant (vectors, d)."""
 
-    matrix: Array
+    rows: scipy.sparse.csr_array
     constant: Array
+
+    @cached_property
+    def matrix(self) -> Array:
+        """The rows as an array, (vectors, d, unknowns)."""
+        return np.asarray(self.rows.toarray().reshape(*self.constant.shape, -1))
 
     def at(self, q: Array) -> Array:
         """The vectors at the coordinates q, (vectors, d)."""
-        return self.matrix @ q + self.constant
+        return self.moved(q) + self.constant
+
+    def moved(self, move: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """How the vectors change with a displacement of the coordinates, real or complex, (vectors, d)."""
+        return np.asarray(self.rows @ move).reshape(self.constant.shape)
 
     def turning(self, q: Array) -> Array:
         """Return the derivatives of the angles [rad] of directions at q, about z, (vectors, unknowns)."""
@@ -123,8 +137,24 @@ class Points(NamedTuple):
 
 def points(vectors: Sequence[Affine], unknowns: int, lane: int = 0) -> Points:
     """Vectors of a placement as one matrix, in one of its lanes."""
-    matrix, constant = matrices(vectors, unknowns, np.array([lane]))
-    return Points(matrix[0], constant[0])
+    import scipy.sparse
+
+    dimensions = len(vectors[0].constant) if vectors else plane.DIMENSIONS
+    constant = np.zeros((len(vectors), dimensions))
+    entries, columns, ends = [np.zeros((0, dimensions))], list[int](), [0]
+    for k, vector in enumerate(vectors):
+        constant[k] = vector.constant[:, lane % vector.constant.shape[1]]
+        entries += [c[None, :, lane % c.shape[1]] for c in vector.terms.values()]
+        columns += vector.terms
+        ends.append(len(columns))
+    # Entry p of vector k stands in d rows, one for each component.
+    number = np.repeat(np.arange(len(vectors)), np.diff(ends))
+    rows = dimensions * number[:, None] + np.arange(dimensions)
+    where = rows.ravel(), np.repeat(np.array(columns, dtype=np.int64), dimensions)
+    size = len(vectors) * dimensions, unknowns
+    matrix = scipy.sparse.csr_array((np.concatenate(entries).ravel(), where), shape=size)
+    matrix.eliminate_zeros()
+    return Points(matrix, constant)
 
 
 def matrices(vectors: Sequence[Affine], unknowns: int, lanes: Index) -> tuple[Array, Array]:

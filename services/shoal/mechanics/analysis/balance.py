@@ -1,10 +1,11 @@
 """Static equilibrium of a model: Newton's method and descent of the potential, on the constraints.
 
-Both work in a basis Z of the free directions with Z' M Z = I, so that lengths are in kg^1/2 m and the eigenvalues of
-the reduced stiffness Z' (K + sum lambda_k C_k,qq) Z are squared frequencies. Descent replaces them by their absolute
-values, so that it leaves saddles and maxima (Dauphin et al. 2014), and shortens its step as Levenberg and Marquardt do.
-Loads that follow the motion have no potential: with them the machine creeps, as if overdamped, by implicit steps that
-grow as it comes to rest (pseudo-transient continuation, Kelley and Keyes 1998).
+Both work in the free directions Z with Z' M Z = I, so that lengths are in kg^1/2 m and the eigenvalues of the reduced
+stiffness Z' (K + sum lambda_k C_k,qq) Z are squared frequencies; of a large machine the lowest ones (`sparse_freedom`).
+Descent replaces negative ones by their absolute values, so that it leaves saddles and maxima (Dauphin et al. 2014), and
+shortens its step as Levenberg and Marquardt do. Loads that follow the motion have no potential: with them the machine
+creeps, as if overdamped, by implicit steps that grow as it comes to rest (pseudo-transient continuation, Kelley and
+Keyes 1998).
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ import scipy.sparse
 
 from shoal.mechanics.analysis.evaluate import Evaluation, Evaluator
 from shoal.mechanics.analysis.freedom import Freedom, Metric
-from shoal.mechanics.analysis.small_motions import ROUND, BoundedMatrix, Spectrum, parts_of, spectrum
+from shoal.mechanics.analysis.small_motions import ROUND, BoundedMatrix, Spectrum, parts_of
+from shoal.mechanics.analysis.sparse_freedom import SparseFreedom, SparseMetric
 from shoal.mechanics.numerics.newton import Root, newton
 from shoal.mechanics.numerics.tile import Array
 
@@ -48,20 +50,27 @@ OFF = 16.0
 """So many times what is left of the forces may be off by, over the machine's size, is the stiffness off."""
 
 
+LARGE = 400
+"""Machines of more unknowns have no explicit basis of the free directions; from here on it takes longer."""
+LOWEST = 6
+"""So many of the lowest motions are asked for, where no others say how many."""
+ACTIVE = 0.03
+"""Parts of a step that are longer than this share of the longest one."""
+
 FALLS = "falls without end"
 """Why a machine that has gone `FAR` does not come to rest."""
 
 
 class View(NamedTuple):
-    """A state at rest: its forces, the free directions, the multipliers, and the unbalanced force along Z.
+    """A state at rest: its forces, the free directions, and the multipliers.
 
-    turning: the force along each motion that is left out
+    acceleration: by the unbalanced forces, Z Z' Q; turning: the force along each motion that is left out
     """
 
     evaluation: Evaluation
-    freedom: Freedom
+    freedom: Freedom | SparseFreedom
     multipliers: Array
-    unbalanced: Array
+    acceleration: Array
     turning: Array
 
 
@@ -73,7 +82,7 @@ class Balance:
 
     def __init__(self, evaluator: Evaluator, t: float, size: float, mass: float) -> None:
         self.evaluator, self.t = evaluator, t
-        self.metric = Metric(evaluator.mass)
+        self.metric = metric_of(evaluator)
         self.left_out = np.zeros((0, evaluator.model.unknowns))
         self.size, self.unit = size, size * np.sqrt(mass)
         q = evaluator.model.q0[:, 0]
@@ -84,30 +93,27 @@ class Balance:
         """Forces, free directions and multipliers at q."""
         evaluation = self.evaluator.at(q, t=self.t, load=load)
         freedom, count = self._freedom(evaluation), evaluation.jacobian.shape[0]
-        lagrange = freedom.multipliers(evaluation.force)
-        unbalanced = freedom.basis.T @ evaluation.force
-        return View(evaluation, freedom, lagrange[:count], unbalanced, lagrange[count:])
+        acceleration, lagrange = freedom.split(evaluation.force)
+        return View(evaluation, freedom, lagrange[:count], acceleration, lagrange[count:])
 
-    def _freedom(self, evaluation: Evaluation) -> Freedom:
+    def _freedom(self, evaluation: Evaluation) -> Freedom | SparseFreedom:
         rows = evaluation.jacobian
         if len(self.left_out):
             rows = scipy.sparse.vstack([rows, scipy.sparse.csr_array(self.left_out)])
         return self.metric.freedom(rows)
 
-    def _closing(self, evaluation: Evaluation, freedom: Freedom) -> Array:
+    def _closing(self, evaluation: Evaluation, freedom: Freedom | SparseFreedom) -> Array:
         """The smallest move that closes the joints."""
         return freedom.shift(np.append(-evaluation.gap, np.zeros(len(self.left_out))))
 
-    def hessian(self, q: Array, view: View, load: float = 1.0) -> Array:
-        """The reduced stiffness [rad^2/s^2]."""
-        full = self.evaluator.stiffness(q, self.t, multipliers=view.multipliers, load=load)
-        basis = view.freedom.basis
-        return np.asarray(basis.T @ (full @ basis))
+    def stiffness(self, q: Array, view: View, load: float = 1.0) -> scipy.sparse.csc_array:
+        """The stiffness K + sum lambda_k C_k,qq in all coordinates."""
+        return self.evaluator.stiffness(q, self.t, multipliers=view.multipliers, load=load)
 
     def tangent(self, q: Array, view: View, load: float = 1.0) -> BoundedMatrix:
-        """The stiffness K + sum lambda_k C_k,qq in all coordinates."""
+        """The same with the bound of its round-off."""
         loose = self.evaluator.stiffness(q, self.t, load=load)
-        full = self.evaluator.stiffness(q, self.t, multipliers=view.multipliers, load=load)
+        full = self.stiffness(q, view, load)
         return BoundedMatrix(full, ROUND * (abs(loose) + abs(full - loose)))
 
     def at_rest(self, q: Array, view: View) -> BoundedMatrix:
@@ -118,14 +124,14 @@ class Balance:
         left = np.abs(evaluation.force - evaluation.jacobian.T @ view.multipliers) / self.size
         return BoundedMatrix(found.matrix, found.bound + OFF * scipy.sparse.diags_array(left))
 
-    def spectrum(self, q: Array, view: View, load: float = 1.0) -> Spectrum:
-        """The squared frequencies of small motions, where the loads have a potential."""
-        return self.spectrum_of(self.tangent(q, view, load), view)
+    def spectrum(self, q: Array, view: View, load: float = 1.0, least: int = LOWEST) -> Spectrum:
+        """The squared frequencies of small motions, where the loads have a potential; least: see `spectrum_of`."""
+        return self.spectrum_of(self.tangent(q, view, load), view, least)
 
-    def spectrum_of(self, stiffness: BoundedMatrix, view: View) -> Spectrum:
-        """Return the spectrum of a symmetric stiffness."""
+    def spectrum_of(self, stiffness: BoundedMatrix, view: View, least: int = LOWEST) -> Spectrum:
+        """Return the spectrum of a symmetric stiffness; of a large machine at least so many of the lowest."""
         parts = parts_of(self.evaluator.mass, view.evaluation.jacobian)
-        return spectrum(stiffness, view.freedom.basis, self.evaluator.mass, parts)
+        return view.freedom.spectrum(stiffness, self.evaluator.mass, parts, least)
 
     def residual(self, view: View) -> float:
         """Unbalanced force over the elastic and the applied force, all in the metric of M^-1.
@@ -133,8 +139,8 @@ class Balance:
         Where neither acts, over the force that a strain of 1e-9 would take.
         """
         scale = self._scale(view)
-        left = np.append(view.unbalanced, view.turning)
-        return float(np.linalg.norm(left)) / scale if scale > 0 else 0.0
+        left = np.hypot(self.length(view.acceleration), np.linalg.norm(view.turning))
+        return float(left) / scale if scale > 0 else 0.0
 
     def _scale(self, view: View) -> float:
         parts = (view.evaluation.elastic, view.evaluation.force - view.evaluation.elastic)
@@ -160,12 +166,10 @@ class Balance:
 
         def correct(q: Array) -> tuple[Array, float]:
             view = self.look(q, load)
-            stiffness = self.evaluator.stiffness(q, self.t, multipliers=view.multipliers, load=load)
-            basis = view.freedom.basis
+            stiffness = self.stiffness(q, view, load)
             back = self._closing(view.evaluation, view.freedom)
-            y = np.linalg.solve(basis.T @ (stiffness @ basis), view.unbalanced - basis.T @ (stiffness @ back))
-            size = float(np.linalg.norm(y)) / self.unit + float(np.max(np.abs(back), initial=0.0))
-            return back + basis @ y, size
+            move = view.freedom.step(stiffness, self._unbalanced(view) - stiffness @ back)
+            return back + move, self.length(move) / self.unit + float(np.max(np.abs(back), initial=0.0))
 
         return newton(correct, q, close=CLOSE, round_off=STALLED, divergent=DIVERGENT, most=most)
 
@@ -181,28 +185,24 @@ class Balance:
         begin, shift, correction = q, 0.0, np.inf
         view = self.look(q)
         for iteration in range(1, most + 1):
-            curvature, modes, _, zero = self.spectrum(q, view)
-            pull = modes.T @ view.unbalanced
-            # What nothing pulls and nothing holds stays where it is.
-            idle = (np.abs(curvature) <= zero) & (np.abs(pull) <= SEEN * self._scale(view))
-            pull[idle] = 0.0
+            slope = self._slope(q, view)
             if self.residual(view) < SEEN**1.3:
                 return Root(q, True, iteration, correction)
             potential = view.evaluation.potential
             noise = 1e-13 * (abs(view.evaluation.strain) + abs(view.evaluation.gravity) + abs(potential))
             while True:
-                y = pull / (np.maximum(np.abs(curvature), zero) + shift)
-                length = float(np.linalg.norm(y))
+                move, active = slope.step(shift)
+                length = self.length(move)
                 if length > LONGEST * self.unit:
-                    y *= LONGEST * self.unit / length
-                trial, gap = self.restore(q + view.freedom.basis @ (modes @ y))
-                correction = float(np.linalg.norm(y)) / self.unit
+                    move = move * (LONGEST * self.unit / length)
+                    length = LONGEST * self.unit
+                trial, gap = self.restore(q + move)
+                correction = length / self.unit
                 ahead = self.look(trial)
                 change = ahead.evaluation.potential - potential
                 if gap < 1e-10 and not change <= noise:
                     # Turning along straight lines stretches: take the stiff directions back before judging.
-                    active = np.abs(y) > 0.03 * np.max(np.abs(y))
-                    trial, gap = self._relax(trial, 10.0 * float(np.max(np.abs(curvature[active]))))
+                    trial, gap = self._relax(trial, 10.0 * active)
                     ahead = self.look(trial)
                     change = ahead.evaluation.potential - potential
                 if gap < 1e-10 and change <= noise and turn(q, trial) < WIDEST:
@@ -210,15 +210,33 @@ class Balance:
                 if correction < CLOSE:
                     good = self.residual(view) < np.sqrt(SEEN)
                     return Root(q, good, iteration, correction, "" if good else "the descent of the potential stalls")
-                shift = max(4.0 * shift, float(np.linalg.norm(pull)) / max(float(np.linalg.norm(y)), 1e-300))
-            held = bool(np.all((curvature > zero) | idle))
+                shift = max(4.0 * shift, slope.size / max(length, 1e-300))
             follow(trial)
             q, view, shift = trial, ahead, shift / 8.0 if correction > 1e-6 else 0.0
-            if held and correction < CLOSE:
+            if slope.holds and correction < CLOSE:
                 return Root(q, True, iteration, correction)
-            if self._way(q - begin) > FAR * self.unit:
+            if self.length(q - begin) > FAR * self.unit:
                 return Root(q, False, iteration, correction, FALLS)
         return Root(q, False, most, correction, f"not at rest after {most} steps downhill")
+
+    def _unbalanced(self, view: View) -> Array:
+        """Return the generalised force that is not balanced."""
+        return np.asarray(self.evaluator.mass @ view.acceleration)
+
+    def _slope(self, q: Array, view: View) -> _Slope:
+        """Return the slope and the curvatures of the potential."""
+        stiffness = self.tangent(q, view)
+        found, force = self.spectrum_of(stiffness, view), self._unbalanced(view)
+        pull = found.shapes.T @ force
+        # What nothing pulls and nothing holds stays where it is.
+        idle = (np.abs(found.values) <= found.levels) & (np.abs(pull) <= SEEN * self._scale(view))
+        left = force - self.evaluator.mass @ (found.shapes @ pull)
+        is_whole = len(found.values) == view.freedom.count
+        holds = bool(np.all((found.values > found.levels) | idle))
+        pull = np.where(idle, 0.0, pull)
+        rest = 0.0 if is_whole else self.length(view.acceleration - found.shapes @ pull)
+        size = float(np.hypot(np.linalg.norm(pull), rest))
+        return _Slope(self, view.freedom, stiffness.matrix, found, pull, None if is_whole else left, size, holds)
 
     def creep(
         self, q: Array, turn: Callable[[Array, Array], float], follow: Callable[[Array], None], most: int = 400
@@ -234,14 +252,15 @@ class Balance:
         for iteration in range(1, most + 1):
             if self.residual(view) < SEEN**1.3:
                 return Root(q, True, iteration, correction)
-            stiffness = self.hessian(q, view)
+            full, basis = self.stiffness(q, view), view.freedom.basis
+            stiffness = basis.T @ (full @ basis)
             pushed = max(0.0, -2.0 * float(np.min(scipy.linalg.eigvals(stiffness).real)))
-            pull = float(np.linalg.norm(view.unbalanced)) / (LONGEST * self.unit)
+            pull = self.length(view.acceleration) / (LONGEST * self.unit)
             while True:
                 shift = max(slower * pull, pushed)
-                y = np.linalg.solve(stiffness + shift * np.eye(len(stiffness)), view.unbalanced)
-                correction = float(np.linalg.norm(y)) / self.unit
-                trial, gap = self.restore(q + view.freedom.basis @ y)
+                move = view.freedom.step(full, self._unbalanced(view), shift)
+                correction = self.length(move) / self.unit
+                trial, gap = self.restore(q + move)
                 if (gap < 1e-10 and turn(q, trial) < NARROW) or correction < CLOSE:
                     break
                 slower = 4.0 * shift / pull
@@ -249,23 +268,61 @@ class Balance:
             q, view, slower = trial, self.look(trial), max(1.0, slower / 4.0)
             if correction < CLOSE or (correction < STALLED and self.residual(view) < SEEN):
                 return Root(q, True, iteration, correction)
-            if self._way(q - begin) > FAR * self.unit:
+            if self.length(q - begin) > FAR * self.unit:
                 return Root(q, False, iteration, correction, FALLS)
         return Root(q, False, most, correction, f"not at rest after {most} steps")
 
-    def _way(self, move: Array) -> float:
+    def length(self, move: Array) -> float:
         """Return the length of a move [kg^1/2 m]; its components include curvatures, which may be large."""
         return float(np.sqrt(max(0.0, float(move @ (self.evaluator.mass @ move)))))
 
     def _relax(self, q: Array, stiff: float) -> tuple[Array, float]:
-        """Newton's method in the directions stiffer than `stiff` [rad^2/s^2] alone; as `restore`."""
+        """Newton's method, damped so that it moves directions stiffer than `stiff` [rad^2/s^2]; as `restore`."""
 
         def correct(q: Array) -> tuple[Array, float]:
             view = self.look(q)
-            curvature, modes = scipy.linalg.eigh(self.hessian(q, view))
-            pull = modes.T @ view.unbalanced
-            y = np.where(curvature > stiff, pull / np.where(curvature > stiff, curvature, 1.0), 0.0)
-            return view.freedom.basis @ (modes @ y), float(np.linalg.norm(y)) / self.unit
+            move = view.freedom.step(self.stiffness(q, view), self._unbalanced(view), stiff)
+            return move, self.length(move) / self.unit
 
         relaxed = newton(correct, q, close=1e-6, most=4, move=lambda q, step: self.restore(q + step)[0])
         return self.restore(relaxed.point)
+
+
+class _Slope(NamedTuple):
+    """The slope of the potential along the lowest motions, and what is left of it along the others, None if there are
+    none. size: of all, in the metric of M^-1; holds: whether nothing is held by less than round-off, or pushed away.
+    """
+
+    balance: Balance
+    freedom: Freedom | SparseFreedom
+    stiffness: scipy.sparse.csc_array
+    lowest: Spectrum
+    pull: Array
+    left: Array | None
+    size: float
+    holds: bool
+
+    def step(self, damping: float) -> tuple[Array, float]:
+        """Return the step of Newton's method with absolute curvatures, and the largest one that matters to it."""
+        curvature, shapes, levels = self.lowest
+        y = self.pull / (np.maximum(np.abs(curvature), levels) + damping)
+        active = np.abs(y) > ACTIVE * np.max(np.abs(y), initial=0.0)
+        stiff, move = float(np.max(np.abs(curvature[active]), initial=0.0)), shapes @ y
+        if self.left is not None:
+            mass = self.balance.evaluator.mass
+            rest = self.freedom.step(self.stiffness, self.left, damping)
+            rest = rest - shapes @ (shapes.T @ (mass @ rest))
+            move, square = move + rest, self.balance.length(rest) ** 2
+            if square > (ACTIVE * np.max(np.abs(y), initial=0.0)) ** 2:
+                stiff = max(stiff, float(rest @ (self.stiffness @ rest)) / square)
+        return move, stiff
+
+
+def metric_of(evaluator: Evaluator) -> Metric | SparseMetric:
+    """Return the mass matrix of a machine, factored as its size and its loads want it.
+
+    The stiffness of loads that follow the motion is not symmetric, and such a machine has its whole basis.
+    """
+    if evaluator.model.unknowns <= LARGE or evaluator.follows:
+        return Metric(evaluator.mass)
+    return SparseMetric(evaluator.mass, evaluator.pattern)

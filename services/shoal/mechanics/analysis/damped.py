@@ -48,13 +48,13 @@ class Roots(NamedTuple):
         return Roots(self.values[order], self.shapes[:, order], self.levels[order])
 
 
-def small(balance: Balance, q: Array, view: View) -> Roots:
-    """The roots of small motions about a state q at rest, seen as `view`."""
+def small(balance: Balance, q: Array, view: View, count: int = AT_MOST) -> Roots:
+    """The roots of small motions about a state q at rest, seen as `view`; count: of those that matter."""
     stiffness, friction, follows = balance.at_rest(q, view), balance.evaluator.damping(q), balance.evaluator.follows
     symmetric = stiffness._replace(matrix=(stiffness.matrix + stiffness.matrix.T) / 2) if follows else stiffness
-    found = balance.spectrum_of(symmetric, view)
     if not follows and not np.any(friction.data):
-        return undamped(found)
+        return undamped(balance.spectrum_of(symmetric, view, count))
+    found = balance.spectrum_of(symmetric, view, AT_MOST)
     return roots(stiffness, BoundedMatrix(friction, ROUND * abs(friction.copy())), found, follows=follows)
 
 

@@ -91,6 +91,12 @@ class Evaluator:
         return sparse.matrix(self._arrays.pattern, self._arrays.mass)
 
     @cached_property
+    def pattern(self) -> scipy.sparse.csc_array:
+        """Ones where the stiffness may have entries, (unknowns, unknowns)."""
+        pattern = self._tangent.pattern
+        return sparse.matrix(pattern, np.ones(pattern.slots))
+
+    @cached_property
     def _rows(self) -> Sparse:
         return _expansion(self.model)
 

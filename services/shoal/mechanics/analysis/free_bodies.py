@@ -66,7 +66,7 @@ class FreeBodies:
     def state(self, q: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
         """Coordinates, rates and accelerations of the free bodies, (..., unknowns)."""
         matrix, constant = self._map
-        return q @ matrix.T + constant, v @ matrix.T, a @ matrix.T
+        return (matrix @ q.T).T + constant, (matrix @ v.T).T, (matrix @ a.T).T
 
 
 def _without_joints(scene: Scene, placement: Placement) -> Scene:
@@ -122,15 +122,16 @@ def _with_inertia(scene: Scene) -> tuple[Scene, dict[str, float]]:
     return scene.model_copy(update={"bodies": bodies}), lent
 
 
-def _coordinates(free: Placement, joined: Placement, unknowns: int) -> tuple[Array, Array]:
-    """Coordinates of the free bodies by those of the machine: a matrix and a constant."""
+def _coordinates(free: Placement, joined: Placement, unknowns: int) -> tuple[scipy.sparse.csr_array, Array]:
+    """Coordinates of the free bodies by those of the machine: a sparse matrix and a constant."""
     pairs = [(free.drivers[name], joined.drivers[name]) for name in free.drivers]
     for name, frame in free.frames.items():
         pairs += zip(frame.vectors, joined.frames[name].vectors, strict=True)
-    matrix = np.zeros((len(free.positions), unknowns))
-    constant = np.zeros(len(free.positions))
     found = points([there for _, there in pairs], unknowns)
+    number, size = np.full(len(free.positions), -1), found.constant.shape[1]
     for k, (here, _) in enumerate(pairs):
-        rows = list(here.own or ())
-        matrix[rows], constant[rows] = found.matrix[k], found.constant[k]
-    return matrix, constant
+        if here.own:
+            number[list(here.own)] = size * k + np.arange(size)
+    known = np.flatnonzero(number >= 0)
+    chosen = scipy.sparse.csr_array((np.ones(len(known)), (known, number[known])), (len(number), found.constant.size))
+    return chosen @ found.rows, chosen @ found.constant.ravel()

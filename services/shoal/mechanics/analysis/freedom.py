@@ -1,4 +1,8 @@
-"""The directions that the constraints leave free, and the constraint forces, in the metric of the mass matrix."""
+"""The directions that the constraints leave free, and the constraint forces, in the metric of the mass matrix.
+
+Small machines have an explicit basis of them (Golub and Van Loan, Matrix Computations, section 5.4), large ones the
+sparse problem of `sparse_freedom`.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy.linalg
 
+from shoal.mechanics.analysis.small_motions import BoundedMatrix, Spectrum, spectrum
 from shoal.mechanics.numerics.tile import Array
 
 RANK = 1e-8
@@ -27,13 +32,41 @@ class Freedom(NamedTuple):
     across: Array
     inverse: Array
 
+    @property
+    def count(self) -> int:
+        """Number of degrees of freedom."""
+        return int(self.basis.shape[1])
+
+    def split(self, force: Array) -> tuple[Array, Array]:
+        """Return the acceleration that the constraints leave of a force, and the multipliers.
+
+        These are the lambda of least norm for which Q - C_q' lambda is smallest in the metric of M^-1.
+        """
+        return self.basis @ (self.basis.T @ force), self.multipliers(force)
+
     def multipliers(self, force: Array) -> Array:
-        """The lambda of least norm for which Q - C_q' lambda is smallest in the metric of M^-1."""
+        """Return the multipliers alone."""
         return np.asarray(self.inverse @ (self.across.T @ force))
 
     def shift(self, gap: Array) -> Array:
         """The smallest d (metric of M) with C_q d = gap, as far as C_q reaches."""
         return np.asarray(self.across @ (self.inverse.T @ gap))
+
+    def step(self, stiffness: Any, force: Array, damping: float = 0.0) -> Array:
+        """Return the displacement d along the free directions with Z' (K + damping M) d = Z' force.
+
+        Raises LinAlgError where it is not unique.
+        """
+        reduced = self.basis.T @ (stiffness @ self.basis)
+        return np.asarray(self.basis @ np.linalg.solve(reduced + damping * np.eye(len(reduced)), self.basis.T @ force))
+
+    def anywhere(self) -> Array:
+        """Return a fixed combination of all free directions, long enough to leave a singular position."""
+        return np.asarray(self.basis @ np.cos(1.0 + np.arange(self.count)))
+
+    def spectrum(self, stiffness: BoundedMatrix, mass: Any, parts: Array, least: int) -> Spectrum:
+        """Return the whole spectrum of a symmetric stiffness, see `small_motions`; least: modes that are asked for."""
+        return spectrum(stiffness, self.basis, mass, parts)
 
 
 class Metric:

@@ -43,10 +43,10 @@ def idle_spins(balance: Balance, placement: Placement, q: Array) -> tuple[Array,
     free = found.shapes[:, np.abs(found.values) <= found.levels]
     if not free.size:
         return none, []
-    seen = points(list(_seen(placement, axes, balance.size)), len(q)).matrix.reshape(-1, len(q)) @ free
-    _, sizes, ways = np.linalg.svd(seen, full_matrices=True)
+    seen = points(list(_seen(placement, axes, balance.size)), len(q)).rows @ free
+    _, sizes, ways = np.linalg.svd(seen, full_matrices=len(seen) < free.shape[1])
     spins = free @ ways[int(np.sum(sizes > UNSEEN * np.max(np.abs(free)))) :].T
-    turning = {name: points(own, len(q)).matrix @ spins for name, own in directors.items()}
+    turning = {name: points(own, len(q)).rows @ spins for name, own in directors.items()}
     names = [name for name, own in turning.items() if np.max(np.abs(own), initial=0.0) > UNSEEN]
     return (balance.evaluator.mass @ spins).T, names
 

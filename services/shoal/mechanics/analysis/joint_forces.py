@@ -16,7 +16,7 @@ from shoal.mechanics.affine import Affine
 from shoal.mechanics.analysis.free_motion import FreeMotion
 from shoal.mechanics.frames import BeamFrame, Frame, ModalFrame, PointFrame
 from shoal.mechanics.joints import Geared, Sum
-from shoal.mechanics.numerics.tile import Array
+from shoal.mechanics.numerics.tile import Array, Index
 from shoal.scene import Revolute, Slider
 
 
@@ -134,14 +134,19 @@ def friction(motion: FreeMotion, held: Mapping[str, Array]) -> dict[str, Compone
 
 
 class Displacements(NamedTuple):
-    """Displacements of one free body whose work must vanish: its unknowns, and (samples, displacements, unknowns)."""
+    """Displacements of one free body whose work must vanish, each of a few unknowns.
 
-    unknowns: list[int]
-    matrix: Array
+    unknowns: those of all displacements, one after the other, (entries,); values: of them, (samples, entries); first:
+    entry at which each displacement begins, (displacements,)
+    """
+
+    unknowns: Index
+    values: Array
+    first: Index
 
     def work(self, force: Array) -> Array:
         """Return the work of generalised forces, (samples, unknowns of all), in each displacement."""
-        return np.asarray(np.einsum("nku,nu->nk", self.matrix, force[:, self.unknowns]))
+        return np.add.reduceat(self.values * force[:, self.unknowns], self.first, axis=1)
 
 
 def displacements(motion: FreeMotion, lever: float) -> list[Displacements]:
@@ -155,15 +160,15 @@ def work(moves: list[Displacements], force: Array) -> Array:
 
 
 def _of_body(motion: FreeMotion, frame: Frame, lever: float) -> Displacements:
-    unknowns = [unknown for vector in frame.vectors for unknown in vector.own or ()]
-    first = {id(vector): motion.dimensions * k for k, vector in enumerate(frame.vectors)}
-    rows: list[Array] = []
+    unknowns: list[int] = []
+    parts: list[Array] = []
+    first: list[int] = []
 
     def add(*moves: tuple[Affine, Array]) -> None:
-        row = np.zeros((len(motion.at), len(unknowns)))
+        first.append(len(unknowns))
         for vector, value in moves:
-            row[:, first[id(vector)] : first[id(vector)] + motion.dimensions] = value
-        rows.append(row)
+            unknowns.extend(vector.own or ())
+            parts.append(np.broadcast_to(value, (len(motion.at), motion.dimensions)))
 
     axes = np.eye(motion.dimensions)
     if isinstance(frame, PointFrame):
@@ -186,7 +191,7 @@ def _of_body(motion: FreeMotion, frame: Frame, lever: float) -> Displacements:
         _translate(add, frame.origin, axes)
         for axis in axes:
             add(*((one, np.cross(axis, motion.value(one)) / lever) for one in frame.directors))
-    return Displacements(unknowns, np.stack(rows, axis=1))
+    return Displacements(np.array(unknowns), np.concatenate(parts, axis=1), np.array(first))
 
 
 def _translate(add: Any, vector: Affine, axes: Array) -> None:

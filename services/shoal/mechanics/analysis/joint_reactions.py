@@ -18,10 +18,10 @@ from shoal.errors import InputError
 from shoal.findings import Concluded, Finding, worst_implied
 from shoal.json_values import plain
 from shoal.mechanics.analysis import reaction_findings as kinds
+from shoal.mechanics.analysis.balance import metric_of
 from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.analysis.free_bodies import FreeBodies
 from shoal.mechanics.analysis.free_motion import FreeMotion
-from shoal.mechanics.analysis.freedom import Metric
 from shoal.mechanics.analysis.joint_forces import Component, components, displacements, friction, work
 from shoal.mechanics.analysis.reaction_findings import ReactionsStatus
 from shoal.mechanics.analysis.singular import SHARE, nearby_freedom
@@ -264,7 +264,7 @@ def _sharing(evaluator: Evaluator, q: Array, t: float) -> Array:
     none = np.zeros(evaluator.model.constraints.size)
     if not none.size:
         return none
-    metric = Metric(evaluator.mass)
+    metric = metric_of(evaluator)
     freedom = metric.freedom(evaluator.at(q, t=t).jacobian)
     if freedom.dependent.shape[1] == 0:
         return none

@@ -365,7 +365,7 @@ def _modes(
     view = balance.look(q)
     if names := crossing(evaluator, balance.metric, view.freedom, q, time):
         raise ComputationError(_singular(scene, names))
-    roots = small(balance, q, view)
+    roots = small(balance, q, view, count)
     squares = np.abs(roots.values) ** 2
     hidden = [
         not value and hides(level**2, squares, pull(scene))

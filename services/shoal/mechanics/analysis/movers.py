@@ -24,7 +24,7 @@ def movers(placement: Placement, size: float, displacement: npt.NDArray[Any]) ->
     """
     sizes = {}
     for name, frame in placement.frames.items():
-        moving = points(_vectors(frame, size), len(displacement)).matrix @ displacement
+        moving = points(_vectors(frame, size), len(displacement)).moved(displacement)
         sizes[name] = float(np.max(np.linalg.norm(moving, axis=1)))
     largest = max(sizes.values())
     ranked = sorted((name for name in sizes if sizes[name] > SHARE * largest), key=lambda name: -sizes[name])

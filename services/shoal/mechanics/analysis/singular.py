@@ -10,6 +10,7 @@ import numpy as np
 
 from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.analysis.freedom import Freedom, Metric
+from shoal.mechanics.analysis.sparse_freedom import SparseFreedom, SparseMetric
 from shoal.mechanics.numerics.newton import newton
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
@@ -24,12 +25,13 @@ SHARE = 1e-6
 """A constraint whose part in what depends on others (of unit size) is less does not."""
 
 
-def nearby_freedom(evaluator: Evaluator, metric: Metric, freedom: Freedom, q: Array, t: float) -> Freedom:
+def nearby_freedom(
+    evaluator: Evaluator, metric: Metric | SparseMetric, freedom: Freedom | SparseFreedom, q: Array, t: float
+) -> Freedom | SparseFreedom:
     """Return the tangent space at a state near q that satisfies the constraints; `freedom`, at q, if that is zero."""
-    if not freedom.basis.shape[1]:
+    if not freedom.count:
         return freedom
-    # A fixed combination of all free directions, long enough to leave a singular position.
-    step = freedom.basis @ np.cos(1.0 + np.arange(freedom.basis.shape[1]))
+    step = freedom.anywhere()
     step *= min(1.0, span(evaluator.model.scene)) / np.max(np.abs(step))
 
     def correct(near: Array) -> tuple[Array, float]:
@@ -44,7 +46,9 @@ def nearby_freedom(evaluator: Evaluator, metric: Metric, freedom: Freedom, q: Ar
     return metric.freedom(evaluation.jacobian)
 
 
-def crossing(evaluator: Evaluator, metric: Metric, freedom: Freedom, q: Array, t: float) -> tuple[str, ...]:
+def crossing(
+    evaluator: Evaluator, metric: Metric | SparseMetric, freedom: Freedom | SparseFreedom, q: Array, t: float
+) -> tuple[str, ...]:
     """The constraints that depend on others at q and not beside it, by name; none where q is not singular."""
     if not freedom.dependent.shape[1]:
         return ()

@@ -44,14 +44,13 @@ class BoundedMatrix(NamedTuple):
 
 
 class Spectrum(NamedTuple):
-    """Squared frequencies [rad^2/s^2], lowest first, (n,).
+    """Squared frequencies [rad^2/s^2], lowest first, all or the lowest of them, (n,).
 
-    modes: their shapes in the basis, orthonormal, (n, n); shapes: in the coordinates, (unknowns, n); levels: below
-    these [rad^2/s^2] each is zero to working accuracy, (n,)
+    shapes: in the coordinates, with x' M x = 1, (unknowns, n); levels: below these [rad^2/s^2] each is zero to working
+    accuracy, (n,)
     """
 
     values: Array
-    modes: Array
     shapes: Array
     levels: Array
 
@@ -62,14 +61,28 @@ def spectrum(stiffness: BoundedMatrix, basis: Array, mass: Any = None, parts: Ar
     mass, parts: M and of each unknown the number of the part of the machine that it belongs to, (unknowns,): places
     are rounded too, which a slow motion of a thin wire feels by the tension that this makes in its own part
     """
-    values, modes = _graded(stiffness.matrix, basis)
+    values, modes = graded(stiffness.matrix, basis)
     shapes = basis @ modes
+    if parts is None:
+        return Spectrum(values, shapes, np.maximum(LEAST, stiffness.worth(shapes, shapes)))
+    stiffest = np.max(np.abs(values) * by_part(shapes * (mass @ shapes), parts), axis=1, initial=0.0)
+    return Spectrum(values, shapes, round_off(stiffness, shapes, mass, parts, stiffest))
+
+
+def round_off(stiffness: BoundedMatrix, shapes: Array, mass: Any, parts: Array, stiffest: Array) -> Array:
+    """Return what round-off may be worth in the squared frequencies of shapes with x' M x = 1, (shapes,).
+
+    stiffest: squared frequency of the stiffest motion of each part of the machine, (parts,)
+    """
     levels = np.maximum(LEAST, stiffness.worth(shapes, shapes))
-    if parts is not None:
-        shares = (parts == np.arange(np.max(parts, initial=-1) + 1)[:, None]) @ (shapes * (mass @ shapes))
-        stiffest = np.max(np.abs(values) * shares, axis=1, initial=0.0)
-        levels = np.maximum(levels, TENSION * (stiffest @ shares))
-    return Spectrum(values, modes, shapes, levels)
+    return np.maximum(levels, TENSION * (stiffest @ by_part(shapes * (mass @ shapes), parts)))
+
+
+def by_part(values: Array, parts: Array) -> Array:
+    """Return the sums over the parts of a machine of values by unknown, (unknowns, ...) to (parts, ...)."""
+    sums = np.zeros((int(np.max(parts, initial=-1)) + 1, *values.shape[1:]))
+    np.add.at(sums, parts, values)
+    return sums
 
 
 def parts_of(mass: Any, jacobian: Any) -> Array:
@@ -80,13 +93,14 @@ def parts_of(mass: Any, jacobian: Any) -> Array:
     return np.asarray(scipy.sparse.csgraph.connected_components(pattern + rows.T @ rows, directed=False)[1])
 
 
-def _graded(stiffness: Any, basis: Array) -> tuple[Array, Array]:
+def graded(stiffness: Any, basis: Array) -> tuple[Array, Array]:
+    """Return the values of a symmetric stiffness in a basis, each to its own accuracy, and their shapes in it."""
     if not basis.shape[1]:
         return np.zeros(0), np.zeros((0, 0))
     values, modes = scipy.linalg.eigh(basis.T @ (stiffness @ basis))
     low = np.abs(values) <= LOW * np.max(np.abs(values))
     if np.any(low) and not np.all(low):
-        values[low], turned = _graded(stiffness, basis @ modes[:, low])
+        values[low], turned = graded(stiffness, basis @ modes[:, low])
         modes[:, low] = modes[:, low] @ turned
     return values, modes
 

@@ -96,6 +96,7 @@ class _Search:
         self.balance = Balance(evaluator, time, span(scene), mass)
         self.iterations = self.steps = 0
         self.spinning: list[str] = []
+        self.kept: tuple[Array, tuple[Array, Array, Array]] | None = None
         self.wound = np.zeros(len(self.owners))
         self.last = self.directions.at(evaluator.model.q0[:, 0])
 
@@ -148,17 +149,17 @@ class _Search:
         as those of a round column, the sum that moves it most: other meshes buckle to the same side.
         """
         view = self.balance.look(q)
-        values, modes = scipy.linalg.eigh(self.balance.hessian(q, view))
-        alike = values - values[0] < ALIKE * abs(values[0])
-        shapes = view.freedom.basis @ modes[:, alike]
-        moves = np.tensordot(self.marker_points.matrix, shapes, 1).reshape(-1, shapes.shape[1])
+        values, shapes, _ = self.balance.spectrum(q, view)
+        shapes = shapes[:, values - values[0] < ALIKE * abs(values[0])]
+        moves = self.marker_points.rows @ shapes
         if np.max(np.abs(moves)) < 1e-6 * np.max(np.abs(shapes)):
             moves = shapes
         sizes = np.linalg.norm(moves, axis=1)
         along = moves[int(np.argmax(sizes > 0.9 * np.max(sizes)))]
         lowest = shapes @ along
-        pull = abs(float(along @ (modes[:, alike].T @ view.unbalanced))) / float(np.linalg.norm(along))
-        total = float(np.linalg.norm(view.unbalanced))
+        mass, accelerated = self.evaluator.mass, view.acceleration
+        pull = abs(float(lowest @ (mass @ accelerated))) / float(np.linalg.norm(along))
+        total = self.balance.length(accelerated)
         return lowest * (self.balance.size / float(np.max(np.abs(lowest)))), pull / total if total > 0 else 0.0
 
     def _start_angle(self, scene: Scene, at: Attachment) -> float:
@@ -316,15 +317,22 @@ class _Search:
     def _eigen(self, q: Array) -> tuple[Array, Array, Array]:
         """Eigenvalues of the reduced stiffness (complex with loads that follow), their levels, the lowest one's shape.
 
-        With loads that follow an eigenvalue is the quotient w' K x / w' M x of its left and its right shape.
+        Those of the last state are kept.
         """
+        if self.kept is None or not np.array_equal(self.kept[0], q):
+            self.kept = q.copy(), self._eigen_of(q)
+        return self.kept[1]
+
+    def _eigen_of(self, q: Array) -> tuple[Array, Array, Array]:
+        """The same; with loads that follow they are quotients w' K x / w' M x of their left and right shapes."""
         view = self.balance.look(q)
-        tangent, basis = self.balance.at_rest(q, view), view.freedom.basis
-        if not basis.shape[1]:
+        tangent = self.balance.at_rest(q, view)
+        if not view.freedom.count:
             return np.zeros(0), np.zeros(0), np.zeros_like(q)
         if not self.evaluator.follows:
             own = self.balance.spectrum_of(tangent, view)
             return own.values, own.levels, own.shapes[:, 0]
+        basis = view.freedom.basis
         found, left, right = scipy.linalg.eig(basis.T @ (tangent.matrix @ basis), left=True)
         along, w, x = np.sum(np.conj(left) * right, axis=0), basis @ np.conj(left), basis @ right
         simple = np.abs(along) > np.sqrt(ROUND)
@@ -354,9 +362,7 @@ class _Search:
 
     def _way(self, one: Array, other: Array) -> float:
         """Return the distance of the bodies in two states (RMS), relative to the machine's size."""
-        change = other - one
-        square = float(change @ (self.evaluator.mass @ change))
-        return float(np.sqrt(max(0.0, square))) / float(self.balance.unit)
+        return self.balance.length(other - one) / float(self.balance.unit)
 
     def _driving(self) -> str:
         """The loads that can turn a body without end."""

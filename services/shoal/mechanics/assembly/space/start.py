@@ -224,8 +224,15 @@ class _Start:
                 rigid = motions.U * (DEPENDENT * motions.S[:, :1] < motions.S)[:, None]
                 yield _Wish(matrix.reshape(len(matrix), count, -1), np.zeros((1, count)), allowed=rigid)
 
+    def _rests(self, lanes: Index) -> bool:
+        """Return whether nothing moves and nothing is asked to."""
+        asked = (one.values[lanes] for one in stated(self.scene, self.lanes, RATES))
+        return not (np.any(self.v[:, lanes]) or np.any(self.moving.drift) or any(map(np.any, asked)))
+
     def _moves(self, lanes: Index) -> Flags:
         """Return whether the rates satisfy the constraints and all statements, guesses included, (lanes,)."""
+        if self._rests(lanes):
+            return np.ones(len(lanes), dtype=bool)
         constraints, pace = self._moving(lanes)
         every = (constraints, *self._stated(lanes), *self._straining(lanes))
         return np.asarray(np.all([one.off(self.v[:, lanes].T) <= CLOSED * pace for one in every], axis=0))
