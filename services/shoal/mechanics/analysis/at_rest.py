@@ -33,8 +33,10 @@ def begun(model: Model, scenes: Sequence[Scene] | None = None) -> Model:
     places = np.stack([one.q for one in found], axis=1)
     angles = start_angles(model, [one.turns for one in found])
     markers = np.stack([one.angles for one in found], axis=1)
+    gaps = np.stack([one.gap_angles for one in found], axis=1)
     still = np.zeros_like(places)
-    return replace(model, q0=places, v0=still, start_angles=angles, marker_angles=markers, shared_tiles={})
+    start = {"q0": places, "v0": still, "start_angles": angles, "marker_angles": markers, "gap_angles": gaps}
+    return replace(model, **start, shared_tiles={})
 
 
 def at_start(scene: Scene, *, horizon: float = 0.0) -> Evaluator:
@@ -42,7 +44,7 @@ def at_start(scene: Scene, *, horizon: float = 0.0) -> Evaluator:
 
     Raises InputError if the scene cannot be modelled, or its start as `begun` does.
     """
-    return Evaluator(begun(Machine.of(scene).model(horizon)))
+    return Evaluator(begun(Machine.of(scene).model(horizon)), one_sided=True)
 
 
 def _equilibrium(scene: Scene) -> Equilibrium:

@@ -6,19 +6,26 @@ Descent replaces negative ones by their absolute values, so that it leaves saddl
 shortens its step as Levenberg and Marquardt do. Loads that follow the motion have no potential: with them the machine
 creeps, as if overdamped, by implicit steps that grow as it comes to rest (pseudo-transient continuation, Kelley and
 Keyes 1998).
+
+One-sided constraints g >= 0 are the active set of the descent (Nocedal and Wright, Numerical Optimization, section
+16.5): closed ones are constraints like any other, a step ends where the first open gap closes, and at rest the contact
+that pulls most opens.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg
+import scipy.optimize
 import scipy.sparse
 
 from shoal.mechanics.analysis.evaluate import Evaluation, Evaluator
 from shoal.mechanics.analysis.freedom import Freedom, Metric
+from shoal.mechanics.analysis.rest_contacts import RestContacts
 from shoal.mechanics.analysis.small_motions import ROUND, BoundedMatrix, Spectrum, parts_of
 from shoal.mechanics.analysis.sparse_freedom import SparseFreedom, SparseMetric
 from shoal.mechanics.numerics.newton import Root, newton
@@ -57,6 +64,11 @@ LOWEST = 6
 ACTIVE = 0.03
 """Parts of a step that are longer than this share of the longest one."""
 
+IDLE = 1e-9
+"""Contacts press with more than this part of all forces, as far as round-off tells."""
+TOUCHING = 1e-9
+"""Gaps below this part of the machine's size touch at an equilibrium, whose corrections are below it."""
+
 FALLS = "falls without end"
 """Why a machine that has gone `FAR` does not come to rest."""
 
@@ -77,13 +89,15 @@ class View(NamedTuple):
 class Balance:
     """The balance of forces of one model at time t [s]. size: of the machine [m]; mass: of all bodies [kg].
 
-    left_out: motions z that are not taken, with z' M z = 1, as rows z' M, (motions, unknowns)
+    left_out: motions z that are not taken, with z' M z = 1, as rows z' M, (motions, unknowns); contacts: one-sided
+    constraints, of which those are closed whose numbers are in `closed`
     """
 
     def __init__(self, evaluator: Evaluator, t: float, size: float, mass: float) -> None:
         self.evaluator, self.t = evaluator, t
         self.metric = metric_of(evaluator)
         self.left_out = np.zeros((0, evaluator.model.unknowns))
+        self.contacts, self.closed = RestContacts(evaluator), list[int]()
         self.size, self.unit = size, size * np.sqrt(mass)
         q = evaluator.model.q0[:, 0]
         stiff = abs(evaluator.stiffness(q, t, load=0.0)) @ np.abs(q)
@@ -91,10 +105,47 @@ class Balance:
 
     def look(self, q: Array, load: float = 1.0) -> View:
         """Forces, free directions and multipliers at q."""
-        evaluation = self.evaluator.at(q, t=self.t, load=load)
+        evaluation = self._seen(q, load)
         freedom, count = self._freedom(evaluation), evaluation.jacobian.shape[0]
         acceleration, lagrange = freedom.split(evaluation.force)
         return View(evaluation, freedom, lagrange[:count], acceleration, lagrange[count:])
+
+    def _seen(self, q: Array, load: float = 1.0) -> Evaluation:
+        """A state at rest, with closed contacts among its constraints."""
+        evaluation = self.evaluator.at(q, t=self.t, load=load)
+        if not self.closed:
+            return evaluation
+        gaps, rows = self.contacts.at(q)
+        return replace(
+            evaluation,
+            gap=np.append(evaluation.gap, gaps[self.closed]),
+            jacobian=scipy.sparse.csr_array(scipy.sparse.vstack([evaluation.jacobian, rows[self.closed]])),
+        )
+
+    def pressing(self, view: View) -> Array:
+        """Return the forces of closed contacts [N or N m], in their order, those that pull negative."""
+        return np.asarray(-view.multipliers[self.evaluator.model.constraints.size :])
+
+    def _weights(self, view: View) -> Array:
+        """Return these forces over the size of all forces, in the metric of M^-1."""
+        rows = view.evaluation.jacobian[self.evaluator.model.constraints.size :]
+        sizes = np.array([self.metric.size(row) for row in rows.toarray()][: len(self.closed)])
+        return self.pressing(view) * sizes / max(self._scale(view), 1e-300)
+
+    def hold(self, q: Array) -> dict[str, float]:
+        """Close those contacts that press at a state, and return the forces [N or N m] of all that touch, by name.
+
+        Those without a force stay open, with the force zero.
+        """
+        gaps, _ = self.contacts.at(q)
+        self.closed = touching = np.flatnonzero(np.abs(gaps) <= TOUCHING * self.size).tolist()
+        while self._open(self.look(q)):
+            pass
+        view = self.look(q)
+        pressing = dict(zip(self.closed, self.pressing(view).tolist(), strict=True))
+        idle = {number for number, part in zip(self.closed, self._weights(view), strict=True) if part <= IDLE}
+        self.closed = [number for number in self.closed if number not in idle]
+        return {self.contacts.names[k]: pressing[k] if k in self.closed else 0.0 for k in touching}
 
     def _freedom(self, evaluation: Evaluation) -> Freedom | SparseFreedom:
         rows = evaluation.jacobian
@@ -108,7 +159,12 @@ class Balance:
 
     def stiffness(self, q: Array, view: View, load: float = 1.0) -> scipy.sparse.csc_array:
         """The stiffness K + sum lambda_k C_k,qq in all coordinates."""
-        return self.evaluator.stiffness(q, self.t, multipliers=view.multipliers, load=load)
+        count = self.evaluator.model.constraints.size
+        found = self.evaluator.stiffness(q, self.t, multipliers=view.multipliers[:count], load=load)
+        if not self.closed:
+            return found
+        bent = self.contacts.curvature(q, np.array(self.closed), view.multipliers[count:])
+        return scipy.sparse.csc_array(found + bent)
 
     def tangent(self, q: Array, view: View, load: float = 1.0) -> BoundedMatrix:
         """The same with the bound of its round-off."""
@@ -148,18 +204,18 @@ class Balance:
 
     def restore(self, q: Array) -> tuple[Array, float]:
         """Return the nearest position (metric of M) that satisfies the joints, and the remaining violation."""
-        if self.evaluator.model.constraints.size == 0:
+        if self.evaluator.model.constraints.size == 0 and not self.closed:
             return q, 0.0
 
         def correct(q: Array) -> tuple[Array, float]:
-            evaluation = self.evaluator.at(q, t=self.t)
+            evaluation = self._seen(q)
             if np.max(np.abs(evaluation.gap)) <= CLOSED:
                 return np.zeros_like(q), 0.0
             move = self._closing(evaluation, self._freedom(evaluation))
             return move, float(np.max(np.abs(move)) / np.max(np.abs(q), initial=1.0))
 
         q = newton(correct, q, close=CLOSE, most=12).point
-        return q, float(np.max(np.abs(self.evaluator.at(q, t=self.t).gap)))
+        return q, float(np.max(np.abs(self._seen(q).gap)))
 
     def newton(self, q: Array, load: float = 1.0, most: int = 20) -> Root[Array]:
         """Newton's method with full steps; corrections relative to the machine's size."""
@@ -181,13 +237,16 @@ class Balance:
         Unlike in `newton` the potential judges each step, and the damping depends on what lowers it.
         turn: the largest turn [rad] of a body between two states; follow: counts the turns, called after every step.
         """
-        q, _ = self.restore(q)
+        q = self._closed_at(q)
         begin, shift, correction = q, 0.0, np.inf
         view = self.look(q)
         for iteration in range(1, most + 1):
             slope = self._slope(q, view)
             if self.residual(view) < SEEN**1.3:
-                return Root(q, True, iteration, correction)
+                if not self._open(view):
+                    return Root(q, True, iteration, correction)
+                view, shift = self.look(q), 0.0
+                slope = self._slope(q, view)
             potential = view.evaluation.potential
             noise = 1e-13 * (abs(view.evaluation.strain) + abs(view.evaluation.gravity) + abs(potential))
             while True:
@@ -198,11 +257,13 @@ class Balance:
                     length = LONGEST * self.unit
                 trial, gap = self.restore(q + move)
                 correction = length / self.unit
+                trial, hit = self._until_contact(q, trial)
                 ahead = self.look(trial)
                 change = ahead.evaluation.potential - potential
-                if gap < 1e-10 and not change <= noise:
+                if hit is None and gap < 1e-10 and not change <= noise:
                     # Turning along straight lines stretches: take the stiff directions back before judging.
                     trial, gap = self._relax(trial, 10.0 * active)
+                    trial, hit = self._until_contact(q, trial)
                     ahead = self.look(trial)
                     change = ahead.evaluation.potential - potential
                 if gap < 1e-10 and change <= noise and turn(q, trial) < WIDEST:
@@ -213,11 +274,58 @@ class Balance:
                 shift = max(4.0 * shift, slope.size / max(length, 1e-300))
             follow(trial)
             q, view, shift = trial, ahead, shift / 8.0 if correction > 1e-6 else 0.0
-            if slope.holds and correction < CLOSE:
-                return Root(q, True, iteration, correction)
+            if hit is not None:
+                self.closed.append(hit)
+                q, _ = self.restore(q)
+                view = self.look(q)
+            elif slope.holds and correction < CLOSE:
+                if not self._open(view):
+                    return Root(q, True, iteration, correction)
+                view, shift = self.look(q), 0.0
             if self.length(q - begin) > FAR * self.unit:
                 return Root(q, False, iteration, correction, FALLS)
         return Root(q, False, most, correction, f"not at rest after {most} steps downhill")
+
+    def _closed_at(self, q: Array) -> Array:
+        """Close the joints, and the contacts whose gaps are not open."""
+        q, _ = self.restore(q)
+        if self.contacts.size:
+            while True:
+                gaps, _ = self.contacts.at(q)
+                shut = [int(k) for k in np.flatnonzero(gaps < self.contacts.resolution) if k not in self.closed]
+                if not shut:
+                    break
+                self.closed += shut
+                q, _ = self.restore(q)
+        return q
+
+    def _until_contact(self, q: Array, trial: Array) -> tuple[Array, int | None]:
+        """Return a step from q, cut where the first open gap closes, and the number of that."""
+        if not self.contacts.size:
+            return trial, None
+        open_gaps = [k for k in range(self.contacts.size) if k not in self.closed]
+        if not open_gaps or np.min(self.contacts.at(trial)[0][open_gaps]) >= -self.contacts.resolution:
+            return trial, None
+
+        def way(share: float) -> Array:
+            return self.restore(q + share * (trial - q))[0]
+
+        def least(share: float) -> float:
+            return float(np.min(self.contacts.at(way(share))[0][open_gaps]))
+
+        share = float(scipy.optimize.brentq(least, 0.0, 1.0, xtol=1e-14)) if least(0.0) > 0.0 else 0.0
+        there = way(share)
+        return there, open_gaps[int(np.argmin(self.contacts.at(there)[0][open_gaps]))]
+
+    def _open(self, view: View) -> bool:
+        """Open the contact that pulls most, and return whether there was one."""
+        if not self.closed:
+            return False
+        weights = self._weights(view)
+        pulls = bool(np.min(weights) < -IDLE)
+        if pulls:
+            del self.closed[int(np.argmin(weights))]
+        return pulls
 
     def _unbalanced(self, view: View) -> Array:
         """Return the generalised force that is not balanced."""

@@ -123,6 +123,8 @@ def campbell(
     if not speeds or not all(np.isfinite(speed) and speed >= 0 for speed in speeds):
         raise InputError(f"speeds: give speeds of at least 0 rad/s, found {', '.join(map(str, speeds)) or 'none'}")
     evaluator, placement = as_stated(scene), Machine.of(scene).placement
+    if evaluator.model.gaps.size:
+        raise InputError(f"{evaluator.model.gap_fields[0]}: steady motions take no one-sided constraints")
     q, v = (part[:, 0].copy() for part in (evaluator.model.q0, evaluator.model.v0))
     if any(speeds):
         if np.max(np.abs(v), initial=0.0) <= left_out.STILL:

@@ -30,8 +30,9 @@ class Equilibrium(Concluded):
     relative to all forces; gap: worst violation of a joint; correction: the last one, relative to the machine's size.
     eigenvalues: of the reduced stiffness in the metric of the mass [rad^2/s^2], lowest first; all positive means
     stable, but where forces follow the motion; levels: below these each is zero to working accuracy. steps: load steps.
-    reactions: in the joints, None where the forces do not balance or where they were not asked for.
-    turns: angles [rad] that force elements have counted, by joint or load.
+    contacts: the one-sided constraints that are closed, by name, and the forces with which they press [N or N m].
+    reactions: in the joints, None where the forces do not balance, where contacts press, or where not asked for.
+    turns: angles [rad] that force elements have counted, by joint or load; gap_angles: those of contacts, (gaps,).
     estimates: errors of the markers [m] by source, of the mesh and of the theory of slender rods, None where one is not
     known; None where none were looked for.
     """
@@ -54,8 +55,10 @@ class Equilibrium(Concluded):
     levels: Array
     iterations: int
     steps: int
+    contacts: Mapping[str, float]
     reactions: Reactions | None = field(repr=False)
     turns: Mapping[str, Sequence[float]] = field(repr=False)
+    gap_angles: Array = field(repr=False)
     estimates: Mapping[str, float | None] | None = None
 
     @property
@@ -126,6 +129,7 @@ class Equilibrium(Concluded):
             "constraint_gap": self.gap,
             "correction": plain(self.correction),
             "eigenvalues": plain(np.real(self.eigenvalues)[:6]),
+            "contacts": plain(dict(self.contacts)),
             "iterations": self.iterations,
             "load_steps": self.steps,
             "reactions": self.reactions.to_json() if self.reactions else {},

@@ -20,6 +20,8 @@ from shoal.mechanics.analysis import evaluations
 from shoal.mechanics.analysis.load_stiffness import driven, in_plane, in_space, of_drives
 from shoal.mechanics.dynamics import derived_rows, work_space
 from shoal.mechanics.elements.families import KERNELS, lay
+from shoal.mechanics.functions import Functions
+from shoal.mechanics.gaps import Gaps
 from shoal.mechanics.kernels import ready
 from shoal.mechanics.machine import Machine
 from shoal.mechanics.model import Arrays, Model
@@ -62,14 +64,15 @@ class Evaluation:
 class Evaluator:
     """Evaluates a model at any state; not for threads, as it keeps the turns that angle forces counted.
 
-    lane: of the model; forces and accelerations are available in any lane, all else in the first
+    lane: of the model; forces and accelerations are available in any lane, all else in the first. one_sided: whether
+    the caller sees to one-sided constraints (`rest_contacts`), which are none of this. Raises InputError else.
     """
 
-    def __init__(self, model: Model, lane: int = 0) -> None:
-        if model.gaps.size:
+    def __init__(self, model: Model, lane: int = 0, *, one_sided: bool = False) -> None:
+        if model.gaps.size and not one_sided:
             raise InputError(
-                f"{model.gap_fields[0]}: motions take one-sided constraints, but not yet equilibria, modes, reactions, "
-                "virtual sensors and starts from the end of a run"
+                f"{model.gap_fields[0]}: motions, equilibria and modes take one-sided constraints, but not yet "
+                "reactions, virtual sensors, steady motions and starts from the end of a run"
             )
         self.model = model
         self._arrays = model.tile(SINGLE, slice(lane, lane + 1))
@@ -96,8 +99,25 @@ class Evaluator:
         pattern = self._tangent.pattern
         return sparse.matrix(pattern, np.ones(pattern.slots))
 
+    @property
+    def gaps(self) -> Gaps:
+        """The one-sided constraints."""
+        return self._arrays.gaps
+
+    @property
+    def functions(self) -> Functions:
+        """The functions of time and of places."""
+        return self._arrays.functions
+
+    def rows_at(self, q: Array) -> Array:
+        """Return all rows of a state, coordinates and what follows from them, (rows,)."""
+        self._enter(q, None)
+        derived_rows(SINGLE, self._arrays, self._room)
+        return self._room.z[: self.model.rows].copy()
+
     @cached_property
-    def _rows(self) -> Sparse:
+    def expansion(self) -> Sparse:
+        """The derivatives of all rows of a state by the unknowns, (rows, unknowns)."""
         return _expansion(self.model)
 
     @classmethod
@@ -315,7 +335,7 @@ class Evaluator:
         value = np.concatenate([block.ravel() for _, _, block in parts])
         size = self.model.rows
         block = scipy.sparse.csr_array((value, (row, column)), shape=(size, size))
-        return scipy.sparse.csc_array(self._rows.T @ block @ self._rows)
+        return scipy.sparse.csc_array(self.expansion.T @ block @ self.expansion)
 
 
 def _expansion(model: Model) -> Sparse:

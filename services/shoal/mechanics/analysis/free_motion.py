@@ -41,8 +41,8 @@ class FreeMotion:
 
     def value(self, vector: Affine) -> Array:
         """Return a vector, (samples, d)."""
-        found = points([vector], self.bodies.unknowns)
-        return np.asarray(self.at @ found.matrix[0].T + found.constant[0])
+        unknowns, coefficients, constant = vector.by_lane
+        return np.asarray(self.at[:, unknowns] @ coefficients[0] + constant[0])
 
     def slope(self, vector: Affine) -> Array:
         """Return the derivative of a vector by the coordinates, (d, unknowns)."""

@@ -57,7 +57,9 @@ def as_stated(scene: Scene, *, horizon: float = 0.0) -> Evaluator:
     `taken_up` does.
     """
     model = Machine.of(scene).model(horizon)
-    return Evaluator(taken_up(model, scene.initial_from) if isinstance(scene.initial_from, End) else model)
+    if isinstance(scene.initial_from, End):
+        model = taken_up(model, scene.initial_from)
+    return Evaluator(model, one_sided=True)
 
 
 def _finer(state: End, scene: Scene) -> End:

@@ -169,7 +169,9 @@ def exerted(motion: FreeMotion, change: Array, force: Array, elastic: Array) -> 
         if count
         else np.zeros((len(change), work(moves, inertia).shape[1], 0))
     )
-    left, singular, right = np.linalg.svd(columns, full_matrices=False)
+    # Displacements in which no joint does work, as those of inner nodes of rods, tell nothing about the joints.
+    touched = np.any(columns, axis=(0, 2))
+    left, singular, right = np.linalg.svd(columns[:, touched], full_matrices=False)
     kept = singular > RANK * singular[:, :1]
     inverse = np.where(kept, 1.0 / np.where(kept, singular, 1.0), 0.0)
     held: dict[str, Array] = {}
@@ -177,7 +179,7 @@ def exerted(motion: FreeMotion, change: Array, force: Array, elastic: Array) -> 
         rubbed = friction(motion, held)
         known = sum((part.gradient for part in rubbed.values()), np.zeros_like(force))
         missing = work(moves, inertia - force - known)
-        told = np.einsum("nrk,nr->nk", right, inverse * np.einsum("nwr,nw->nr", left, missing))
+        told = np.einsum("nrk,nr->nk", right, inverse * np.einsum("nwr,nw->nr", left, missing[:, touched]))
         last, held = held, _pressed(motion.scene, parts, told)
         if all(np.all(np.abs(now - last.get(name, 0.0)) <= SETTLED * now) for name, now in held.items()):
             break

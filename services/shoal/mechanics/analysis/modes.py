@@ -262,6 +262,7 @@ def modes(
     check(time=time, count=count)
     evaluator, moving = (at_start if about == "start" else as_stated)(scene, horizon=time), list[Finding]()
     if is_moving(evaluator, time):
+        _refuse_contacts(evaluator)
         q, v = (part[:, 0].copy() for part in (evaluator.model.q0, evaluator.model.v0))
         try:
             return modes_of_motion(scene, evaluator, q, v, about=about, time=time, count=count)[0]
@@ -288,6 +289,12 @@ def _but_for_gravity(scene: Scene, about: str) -> list[str]:
     return [f"gravity alone acts against it: it is steady with --set gravity=[{zeros}]{shaft}"]
 
 
+def _refuse_contacts(evaluator: Evaluator) -> None:
+    """Raises InputError for machines with one-sided constraints, of which steady motions know nothing."""
+    if evaluator.model.gaps.size:
+        raise InputError(f"{evaluator.model.gap_fields[0]}: steady motions take no one-sided constraints")
+
+
 def is_moving(evaluator: Evaluator, time: float) -> bool:
     """Return whether the start has rates or a drive moves at time [s]."""
     q, v = evaluator.model.q0[:, 0], evaluator.model.v0[:, 0]
@@ -304,10 +311,11 @@ def modes_at_rest(
             raise ComputationError(f"{scene.name}: no equilibrium to vibrate about: {equilibrium.explanation}")
         return modes_about(equilibrium, count=count)
     evaluator = at_start(scene, horizon=time)
-    q, gap = _balance(scene, evaluator, time).restore(evaluator.model.q0[:, 0].copy())
+    balance = _balance(scene, evaluator, time)
+    q, gap = balance.restore(evaluator.model.q0[:, 0].copy())
     if gap > 1e-9:
         raise ComputationError(f"{scene.name}: the joints cannot be closed at the start; they gape by {gap:.2g}")
-    return _modes(scene, evaluator, q, time, count, "start", _friction(scene))
+    return _modes(balance, scene, q, count, "start", _friction(scene))
 
 
 def modes_of_motion(
@@ -347,10 +355,12 @@ def _friction(scene: Scene) -> list[Finding]:
 def modes_about(equilibrium: Equilibrium, *, count: int = 10) -> Modes:
     """The `count` lowest modes about an equilibrium. Raises ComputationError where it is singular."""
     scene, time = equilibrium.scene, equilibrium.time
-    evaluator = Evaluator.of(scene, horizon=time)
+    evaluator = Evaluator(Machine.of(scene).model(time), one_sided=True)
     evaluator.turns = start_angles(evaluator.model, [equilibrium.turns])[:, 0]
     remarks = [kinds.ABOUT_DOUBTED.found(one.text) if one.kind.implies else one for one in equilibrium.findings]
-    return _modes(scene, evaluator, equilibrium.q, time, count, "equilibrium", remarks)
+    balance = _balance(scene, evaluator, time)
+    balance.contacts.angles = equilibrium.gap_angles
+    return _modes(balance, scene, equilibrium.q, count, "equilibrium", remarks)
 
 
 def _balance(scene: Scene, evaluator: Evaluator, time: float) -> Balance:
@@ -358,12 +368,16 @@ def _balance(scene: Scene, evaluator: Evaluator, time: float) -> Balance:
     return Balance(evaluator, time, span(scene), mass)
 
 
-def _modes(
-    scene: Scene, evaluator: Evaluator, q: Array, time: float, count: int, about: str, remarks: list[Finding]
-) -> Modes:
-    balance = _balance(scene, evaluator, time)
+def _modes(balance: Balance, scene: Scene, q: Array, count: int, about: str, remarks: list[Finding]) -> Modes:
+    evaluator, time = balance.evaluator, balance.t
+    free = balance.look(q).freedom
+    if idle := [name for name, force in balance.hold(q).items() if not force]:
+        raise ComputationError(
+            f"{scene.name}: {', '.join(idle)} touches without a force: small motions open and close it; they have no "
+            "frequencies"
+        )
     view = balance.look(q)
-    if names := crossing(evaluator, balance.metric, view.freedom, q, time):
+    if names := crossing(evaluator, balance.metric, free, q, time):
         raise ComputationError(_singular(scene, names))
     roots = small(balance, q, view, count)
     squares = np.abs(roots.values) ** 2

@@ -15,6 +15,7 @@ import numpy as np
 import scipy.linalg
 
 from shoal.arguments import check
+from shoal.errors import InputError
 from shoal.findings import Finding
 from shoal.mechanics import plane
 from shoal.mechanics.affine import points
@@ -96,6 +97,7 @@ class _Search:
         self.balance = Balance(evaluator, time, span(scene), mass)
         self.iterations = self.steps = 0
         self.spinning: list[str] = []
+        self.pressing: dict[str, float] = {}
         self.kept: tuple[Array, tuple[Array, Array, Array]] | None = None
         self.wound = np.zeros(len(self.owners))
         self.last = self.directions.at(evaluator.model.q0[:, 0])
@@ -108,9 +110,14 @@ class _Search:
             return self._ending(q, [kinds.JOINTS_OPEN.found(text, gap=gap)])
         self._leave_out_spins(q)
         has_potential = not self.evaluator.follows
+        if self.balance.contacts.size and not has_potential:
+            raise InputError(
+                f"{self.evaluator.model.gap_fields[0]}: statics takes one-sided constraints where the loads have a "
+                f"potential; {self._driving()} has none"
+            )
         met = list[Finding]()
-        found = self._at(q) or self._loaded(q)
-        if (found is None or not found.converged) and not leave_unstable:
+        found = None if self.balance.contacts.size else self._at(q) or self._loaded(q)
+        if (found is None or not found.converged) and not leave_unstable and not self.balance.contacts.size:
             start = q if found is None else found.point
             straight = self._count(self.balance.newton(start))
             if straight.converged and self._turn(start, straight.point) < TURN:
@@ -133,6 +140,8 @@ class _Search:
             if refined.converged and self._turn(found.point, refined.point) < 1e-3:
                 found = refined
                 self._follow(found.point)
+        if found.converged:
+            self.pressing = self.balance.hold(found.point)
         if not found.converged and (endless := self._endless(found)):
             return self._ending(found.point, endless)
         return self._ending(found.point, self._assess(found, met), found)
@@ -229,15 +238,23 @@ class _Search:
         balanced = not failed and found is not None
         rest = np.zeros_like(q)
         eigenvalues, levels, _ = self._eigen(q)
-        react = cache(lambda: reactions_of(self.evaluator, q, rest, rest, self.time)) if balanced else None
-        neglected = left_out.friction(self.scene, react), left_out.driven(self.evaluator, q, self.time)
+        is_pressed = any(self.pressing.values())
+        react = cache(lambda: reactions_of(self.evaluator, q, rest, rest, self.time))
+        react = react if balanced and not is_pressed else None
+        neglected = [left_out.friction(self.scene, react), left_out.driven(self.evaluator, q, self.time)]
+        if is_pressed and self.reactions:
+            neglected.append(f"reactions of joints are left out where contacts press ({', '.join(self.pressing)})")
+        rubbing = (name for name, one in self.scene.contacts.items() if one.rubs)
+        if rough := [name for name in rubbing if f"contacts.{name}" in self.pressing]:
+            neglected.append(f"friction is left out ({', '.join(rough)}): the surfaces may stick at other places, too")
         return Equilibrium(
             scene=self.stated,
             time=self.time,
             findings=[*findings, *(kinds.NEGLECTED.found(text) for text in neglected if text)],
             balanced=balanced,
             q=q,
-            multipliers=view.multipliers,
+            multipliers=view.multipliers[: self.evaluator.model.constraints.size],
+            contacts=self.pressing,
             markers=tuple(self.scene.markers),
             points=at,
             angles=self.angles.copy(),
@@ -252,6 +269,7 @@ class _Search:
             steps=self.steps,
             reactions=react() if react is not None and self.reactions else None,
             turns=named_turns(self.evaluator.model, self.evaluator.turns),
+            gap_angles=self.balance.contacts.angles,
         )
 
     def _assembled(self) -> Array:
@@ -319,8 +337,9 @@ class _Search:
 
         Those of the last state are kept.
         """
-        if self.kept is None or not np.array_equal(self.kept[0], q):
-            self.kept = q.copy(), self._eigen_of(q)
+        state = np.append(q, self.balance.closed)
+        if self.kept is None or not np.array_equal(self.kept[0], state):
+            self.kept = state, self._eigen_of(q)
         return self.kept[1]
 
     def _eigen_of(self, q: Array) -> tuple[Array, Array, Array]:
@@ -376,6 +395,7 @@ class _Search:
     def _follow(self, q: Array) -> None:
         """Count the turns of springs, bodies and markers."""
         self.evaluator.remember(q)
+        self.balance.contacts.remember(q)
         here = self.directions.at(q)
         self.wound += _remainder(plane.angle(here.T) - plane.angle(self.last.T))
         self.last = here

@@ -139,6 +139,8 @@ def equilibrium_table(equilibrium: Equilibrium) -> None:
     screen.out.print(table)
     if equilibrium.reactions is not None:
         reactions_table([equilibrium.reactions])
+    for name, force in equilibrium.contacts.items():
+        screen.say(f"closed: {name}, pressed with {force:.6g} N (or N m)")
     lowest = equilibrium.eigenvalues[:1].real
     screen.say(
         f"status {equilibrium.status}, "
