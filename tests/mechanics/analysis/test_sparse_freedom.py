@@ -40,7 +40,7 @@ def _chain(count: int, size: int = 60) -> tuple[Any, Any, Any]:
 def test_what_constraints_leave_of_a_force_with_rows_that_depend_on_others(count: int) -> None:
     mass, stiffness, jacobian = _chain(count)
     dense, sparse = Metric(mass).freedom(jacobian), SparseMetric(mass, stiffness).freedom(jacobian)
-    assert (sparse.rank, sparse.count) == (dense.rank, dense.count) == (count, 120 - count)
+    assert (sparse.rank, sparse.degrees) == (dense.rank, dense.degrees) == (count, 120 - count)
     force = np.random.default_rng(1).normal(size=120)
     np.testing.assert_allclose(sparse.split(force)[0], dense.split(force)[0], rtol=0, atol=1e-14)
     np.testing.assert_allclose(sparse.split(force)[1], dense.split(force)[1], rtol=0, atol=1e-13)

@@ -34,9 +34,8 @@ def begun(model: Model, scenes: Sequence[Scene] | None = None) -> Model:
     angles = start_angles(model, [one.turns for one in found])
     markers = np.stack([one.angles for one in found], axis=1)
     gaps = np.stack([one.gap_angles for one in found], axis=1)
-    still = np.zeros_like(places)
-    start = {"q0": places, "v0": still, "start_angles": angles, "marker_angles": markers, "gap_angles": gaps}
-    return replace(model, **start, shared_tiles={})
+    model = replace(model, q0=places, v0=np.zeros_like(places), shared_tiles={})
+    return replace(model, start_angles=angles, marker_angles=markers, gap_angles=gaps)
 
 
 def at_start(scene: Scene, *, horizon: float = 0.0) -> Evaluator:

@@ -85,6 +85,12 @@ class View(NamedTuple):
     acceleration: Array
     turning: Array
 
+    @property
+    def basis(self) -> Array:
+        """The basis Z of the free directions of a machine that has one, see `metric_of`."""
+        assert isinstance(self.freedom, Freedom)
+        return self.freedom.basis
+
 
 class Balance:
     """The balance of forces of one model at time t [s]. size: of the machine [m]; mass: of all bodies [kg].
@@ -130,7 +136,7 @@ class Balance:
         """Return these forces over the size of all forces, in the metric of M^-1."""
         rows = view.evaluation.jacobian[self.evaluator.model.constraints.size :]
         sizes = np.array([self.metric.size(row) for row in rows.toarray()][: len(self.closed)])
-        return self.pressing(view) * sizes / max(self._scale(view), 1e-300)
+        return np.asarray(self.pressing(view) * sizes / max(self._scale(view), 1e-300))
 
     def hold(self, q: Array) -> dict[str, float]:
         """Close those contacts that press at a state, and return the forces [N or N m] of all that touch, by name.
@@ -339,7 +345,7 @@ class Balance:
         # What nothing pulls and nothing holds stays where it is.
         idle = (np.abs(found.values) <= found.levels) & (np.abs(pull) <= SEEN * self._scale(view))
         left = force - self.evaluator.mass @ (found.shapes @ pull)
-        is_whole = len(found.values) == view.freedom.count
+        is_whole = len(found.values) == view.freedom.degrees
         holds = bool(np.all((found.values > found.levels) | idle))
         pull = np.where(idle, 0.0, pull)
         rest = 0.0 if is_whole else self.length(view.acceleration - found.shapes @ pull)
@@ -360,7 +366,7 @@ class Balance:
         for iteration in range(1, most + 1):
             if self.residual(view) < SEEN**1.3:
                 return Root(q, True, iteration, correction)
-            full, basis = self.stiffness(q, view), view.freedom.basis
+            full, basis = self.stiffness(q, view), view.basis
             stiffness = basis.T @ (full @ basis)
             pushed = max(0.0, -2.0 * float(np.min(scipy.linalg.eigvals(stiffness).real)))
             pull = self.length(view.acceleration) / (LONGEST * self.unit)

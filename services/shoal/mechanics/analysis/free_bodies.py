@@ -134,4 +134,4 @@ def _coordinates(free: Placement, joined: Placement, unknowns: int) -> tuple[sci
             number[list(here.own)] = size * k + np.arange(size)
     known = np.flatnonzero(number >= 0)
     chosen = scipy.sparse.csr_array((np.ones(len(known)), (known, number[known])), (len(number), found.constant.size))
-    return chosen @ found.rows, chosen @ found.constant.ravel()
+    return scipy.sparse.csr_array(chosen @ found.rows), np.asarray(chosen @ found.constant.ravel())

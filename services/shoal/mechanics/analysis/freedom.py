@@ -12,7 +12,7 @@ import numpy as np
 import scipy.linalg
 
 from shoal.mechanics.analysis.small_motions import BoundedMatrix, Spectrum, spectrum
-from shoal.mechanics.numerics.tile import Array
+from shoal.mechanics.numerics.tile import Array, Index
 
 RANK = 1e-8
 """A combination of constraints, each of unit length, that is shorter than this depends on the others."""
@@ -33,7 +33,7 @@ class Freedom(NamedTuple):
     inverse: Array
 
     @property
-    def count(self) -> int:
+    def degrees(self) -> int:
         """Number of degrees of freedom."""
         return int(self.basis.shape[1])
 
@@ -62,9 +62,9 @@ class Freedom(NamedTuple):
 
     def anywhere(self) -> Array:
         """Return a fixed combination of all free directions, long enough to leave a singular position."""
-        return np.asarray(self.basis @ np.cos(1.0 + np.arange(self.count)))
+        return np.asarray(self.basis @ np.cos(1.0 + np.arange(self.degrees)))
 
-    def spectrum(self, stiffness: BoundedMatrix, mass: Any, parts: Array, least: int) -> Spectrum:
+    def spectrum(self, stiffness: BoundedMatrix, mass: Any, parts: Index, least: int) -> Spectrum:
         """Return the whole spectrum of a symmetric stiffness, see `small_motions`; least: modes that are asked for."""
         return spectrum(stiffness, self.basis, mass, parts)
 

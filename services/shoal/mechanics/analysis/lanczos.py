@@ -23,7 +23,7 @@ from shoal.mechanics.analysis.small_motions import (
     graded,
     round_off,
 )
-from shoal.mechanics.numerics.tile import Array
+from shoal.mechanics.numerics.tile import Array, Index
 
 if TYPE_CHECKING:
     from shoal.mechanics.analysis.sparse_freedom import Saddle, SparseFreedom
@@ -44,7 +44,7 @@ FEW = 4
 """A machine of fewer degrees of freedom than so many times the motions sought is solved for all of them."""
 
 
-def lowest(free: SparseFreedom, stiffness: BoundedMatrix, mass: Any, parts: Array, least: int) -> Spectrum:
+def lowest(free: SparseFreedom, stiffness: BoundedMatrix, mass: Any, parts: Index, least: int) -> Spectrum:
     """Return the lowest part of the spectrum of a symmetric stiffness.
 
     It has at least so many motions, all with negative values, and one that is told from zero, as far as there are
@@ -59,10 +59,10 @@ def lowest(free: SparseFreedom, stiffness: BoundedMatrix, mass: Any, parts: Arra
         if below := inverse.below:
             shift, count = 10.0 * shift, max(count, least + below)
             continue
-        values, shapes = _above(free, inverse, matrix, mass, shift, min(count, free.count), random)
+        values, shapes = _above(free, inverse, matrix, mass, shift, min(count, free.degrees), random)
         levels = round_off(stiffness, shapes, mass, parts, stiffest)
         told = np.abs(values)[np.abs(values) > levels]
-        if not told.size and len(values) < free.count:
+        if not told.size and len(values) < free.degrees:
             count *= 2
         elif told.size < len(values) and -shift < np.min(told, initial=np.inf) / NEAR and not shifted:
             shift, shifted = -float(np.min(told)), True
@@ -70,7 +70,7 @@ def lowest(free: SparseFreedom, stiffness: BoundedMatrix, mass: Any, parts: Arra
             return Spectrum(values, shapes, levels)
 
 
-def _stiffest(free: SparseFreedom, matrix: Any, mass: Any, parts: Array, random: np.random.Generator) -> Array:
+def _stiffest(free: SparseFreedom, matrix: Any, mass: Any, parts: Index, random: np.random.Generator) -> Array:
     """Return the largest squared frequency of every part of the machine, by the power method."""
     moves = free.split(random.normal(size=matrix.shape[0]))[0]
     for _ in range(ROUNDS):
@@ -85,8 +85,8 @@ def _above(
 ) -> tuple[Array, Array]:
     """Return the lowest squared frequencies, none of which is below the shift, and the shapes with x' M x = 1."""
     n, sought = matrix.shape[0], count + SPARE
-    if FEW * sought >= free.count:
-        every = np.stack([free.split(force)[0] for force in random.normal(size=(free.count, n))], axis=1)
+    if FEW * sought >= free.degrees:
+        every = np.stack([free.split(force)[0] for force in random.normal(size=(free.degrees, n))], axis=1)
         return _ordered(matrix, mass, every)
     shapes = np.zeros((n, 0))
     while True:
@@ -103,7 +103,7 @@ def _above(
             sigma=shift,
             OPinv=scipy.sparse.linalg.LinearOperator((n, n), apply, dtype=float),
             v0=random.normal(size=n),
-            ncv=min(2 * missing + KRYLOV, free.count - known.shape[1]),
+            ncv=min(2 * missing + KRYLOV, free.degrees - known.shape[1]),
         )
         values, shapes = _ordered(matrix, mass, np.hstack([known, found]))
         gaps = np.diff(values[count - 1 :]) > APART * (np.abs(values[count:]) - shift)

@@ -29,7 +29,7 @@ def nearby_freedom(
     evaluator: Evaluator, metric: Metric | SparseMetric, freedom: Freedom | SparseFreedom, q: Array, t: float
 ) -> Freedom | SparseFreedom:
     """Return the tangent space at a state near q that satisfies the constraints; `freedom`, at q, if that is zero."""
-    if not freedom.count:
+    if not freedom.degrees:
         return freedom
     step = freedom.anywhere()
     step *= min(1.0, span(evaluator.model.scene)) / np.max(np.abs(step))

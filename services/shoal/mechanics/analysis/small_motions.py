@@ -16,7 +16,7 @@ import numpy.typing as npt
 import scipy.linalg
 import scipy.sparse.csgraph
 
-from shoal.mechanics.numerics.tile import Array
+from shoal.mechanics.numerics.tile import Array, Index
 from shoal.mechanics.reach import span
 from shoal.scene import Scene
 
@@ -55,7 +55,7 @@ class Spectrum(NamedTuple):
     levels: Array
 
 
-def spectrum(stiffness: BoundedMatrix, basis: Array, mass: Any = None, parts: Array | None = None) -> Spectrum:
+def spectrum(stiffness: BoundedMatrix, basis: Array, mass: Any = None, parts: Index | None = None) -> Spectrum:
     """The spectrum of a symmetric stiffness in a basis Z with Z' M Z = I, (unknowns, n).
 
     mass, parts: M and of each unknown the number of the part of the machine that it belongs to, (unknowns,): places
@@ -69,7 +69,7 @@ def spectrum(stiffness: BoundedMatrix, basis: Array, mass: Any = None, parts: Ar
     return Spectrum(values, shapes, round_off(stiffness, shapes, mass, parts, stiffest))
 
 
-def round_off(stiffness: BoundedMatrix, shapes: Array, mass: Any, parts: Array, stiffest: Array) -> Array:
+def round_off(stiffness: BoundedMatrix, shapes: Array, mass: Any, parts: Index, stiffest: Array) -> Array:
     """Return what round-off may be worth in the squared frequencies of shapes with x' M x = 1, (shapes,).
 
     stiffest: squared frequency of the stiffest motion of each part of the machine, (parts,)
@@ -78,14 +78,14 @@ def round_off(stiffness: BoundedMatrix, shapes: Array, mass: Any, parts: Array, 
     return np.maximum(levels, TENSION * (stiffest @ by_part(shapes * (mass @ shapes), parts)))
 
 
-def by_part(values: Array, parts: Array) -> Array:
+def by_part(values: Array, parts: Index) -> Array:
     """Return the sums over the parts of a machine of values by unknown, (unknowns, ...) to (parts, ...)."""
     sums = np.zeros((int(np.max(parts, initial=-1)) + 1, *values.shape[1:]))
     np.add.at(sums, parts, values)
     return sums
 
 
-def parts_of(mass: Any, jacobian: Any) -> Array:
+def parts_of(mass: Any, jacobian: Any) -> Index:
     """The number of the part that each unknown belongs to, (unknowns,); of a mass with the pattern of the stiffness."""
     # Copies, as the index arrays are the model's own, which SciPy may sort.
     pattern, rows = mass.copy(), jacobian.copy()

@@ -72,7 +72,7 @@ class Saddle:
     @property
     def below(self) -> int:
         """Number of negative eigenvalues of H along the free directions."""
-        return int(np.sum(self.pivots < 0)) - self._jacobian.shape[0]
+        return int(np.sum(self.pivots < 0) - self._jacobian.shape[0])
 
     def solve(self, force: Array, gap: Array | None = None, refined: int = REFINED) -> tuple[Array, Array]:
         """Return x and lambda with H x + C_q' lambda = force and C_q x = gap (default: 0).
@@ -139,8 +139,7 @@ class SparseFreedom:
         m = self._jacobian.shape[0]
         sure = np.setdiff1d(np.arange(m), suspects)
         own = self._of_mass(sure)
-        rests: list[Array] = []
-        taken, combinations, left_out = [], [], []
+        rests, taken, combinations, left_out = list[Array](), list[Array](), list[Array](), list[int]()
         for k in suspects:
             row = self._jacobian[[k]].toarray().ravel() / self._lengths[k]
             rest, share = own.solve(row)
@@ -172,7 +171,7 @@ class SparseFreedom:
         return len(self._kept)
 
     @property
-    def count(self) -> int:
+    def degrees(self) -> int:
         """Number of degrees of freedom."""
         return len(self._place) - self.rank
 
@@ -202,7 +201,7 @@ class SparseFreedom:
         """Return the factors of a symmetric matrix along the free directions. Raises LinAlgError."""
         return Saddle(matrix, self._jacobian[self._kept], self._place, mass=self.mass)
 
-    def spectrum(self, stiffness: BoundedMatrix, mass: Any, parts: Array, least: int) -> Spectrum:
+    def spectrum(self, stiffness: BoundedMatrix, mass: Any, parts: Index, least: int) -> Spectrum:
         """Return the lowest part of the spectrum of a symmetric stiffness, see `lanczos.lowest`."""
         return lowest(self, stiffness, mass, parts, least)
 

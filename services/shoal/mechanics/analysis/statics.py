@@ -239,8 +239,8 @@ class _Search:
         rest = np.zeros_like(q)
         eigenvalues, levels, _ = self._eigen(q)
         is_pressed = any(self.pressing.values())
-        react = cache(lambda: reactions_of(self.evaluator, q, rest, rest, self.time))
-        react = react if balanced and not is_pressed else None
+        known = balanced and not is_pressed
+        react = cache(lambda: reactions_of(self.evaluator, q, rest, rest, self.time)) if known else None
         neglected = [left_out.friction(self.scene, react), left_out.driven(self.evaluator, q, self.time)]
         if is_pressed and self.reactions:
             neglected.append(f"reactions of joints are left out where contacts press ({', '.join(self.pressing)})")
@@ -346,12 +346,12 @@ class _Search:
         """The same; with loads that follow they are quotients w' K x / w' M x of their left and right shapes."""
         view = self.balance.look(q)
         tangent = self.balance.at_rest(q, view)
-        if not view.freedom.count:
+        if not view.freedom.degrees:
             return np.zeros(0), np.zeros(0), np.zeros_like(q)
         if not self.evaluator.follows:
             own = self.balance.spectrum_of(tangent, view)
             return own.values, own.levels, own.shapes[:, 0]
-        basis = view.freedom.basis
+        basis = view.basis
         found, left, right = scipy.linalg.eig(basis.T @ (tangent.matrix @ basis), left=True)
         along, w, x = np.sum(np.conj(left) * right, axis=0), basis @ np.conj(left), basis @ right
         simple = np.abs(along) > np.sqrt(ROUND)
