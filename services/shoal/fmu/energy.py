@@ -21,8 +21,8 @@ def energies(scene: Scene, times: Array) -> Array:
         # Turns of torsion springs are counted from sample to sample, which must be less than half a turn apart.
         instants = np.union1d(times, np.arange(0.0, times[-1], scene.solver.step))
     states = simulate(scene, instants, whole=True).states
-    # Contacts have no energy.
-    evaluator, wanted, found = Evaluator(states.model.without_gaps()), set(times.tolist()), []
+    # Contacts have no energy, and are left to the caller.
+    evaluator, wanted, found = Evaluator(states.model, one_sided=True), set(times.tolist()), []
     for k, time in enumerate(instants.tolist()):
         evaluator.remember(states.q[k, :, 0])
         if time in wanted:

@@ -7,7 +7,7 @@ hold, then those of markers).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -164,14 +164,6 @@ class Model:
     marker_angles: Array | None = None
     shared_tiles: dict[int, Arrays] = field(default_factory=dict, compare=False, repr=False)
     """Arrays by tile width, where no number but the initial state depends on the lane."""
-
-    def without_gaps(self) -> Model:
-        """Return the model without its one-sided constraints."""
-        measures = self.gaps.measures
-        empty = {name: getattr(measures, name)[:0] for name in ("kind", "rows", "table", "energy", "drive", "law")}
-        measures = measures._replace(size=0, **empty)
-        gaps = Gaps(0, measures, self.gaps.sign[:0], self.gaps.restitution[:0], 0.0)
-        return replace(self, gaps=gaps, gap_fields=(), gap_angles=self.gap_angles[:0], shared_tiles={})
 
     @property
     def varies(self) -> bool:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.optimize import minimize
+from scipy.optimize import minimize, minimize_scalar
 from shoal.errors import ComputationError, InputError
 from shoal.mechanics.analysis.findings import EquilibriumStatus
 from shoal.mechanics.analysis.going_on import as_stated
@@ -165,3 +165,37 @@ def test_gaps_have_the_derivatives_of_differences(dimensions: int) -> None:
         bent = contacts.curvature(q, np.array([number]), np.array([1.7]))
         slope = (rows_after - rows_before)[[number]].toarray()[0] / (2 * step)
         np.testing.assert_allclose(bent @ way, 1.7 * slope, atol=1e-8)
+
+
+def _ball(**second: Any) -> Scene:
+    """A disc of 2 kg on its centre's spring to the side, and a surface."""
+    disc = {"kind": "rigid-body", "mass": 2.0, "inertia": 0.01}
+    contact = {
+        "floor": {"first": {"body": "A", "radius": 0.1}, "second": {"body": "ground", "point": [0.0, 0.0]} | second}
+    }
+    spring = {"kind": "spring", "first": {"body": "ground", "point": [-2.0, 0.2]}, "second": {"body": "A"},
+              "stiffness": 50.0, "length": 2.0}  # fmt: skip
+    turn = {"kind": "torsion-spring", "first": GROUND, "second": {"body": "A"}, "stiffness": 1.0}
+    return _scene({"A": disc}, {}, loads={"s": spring, "t": turn}, contacts=contact,
+                  initial={"A": {"position": [0.0, 0.3]}})  # fmt: skip
+
+
+def test_a_disc_rests_on_a_line_and_in_a_hole() -> None:
+    flat = statics(_ball(line=0.0))
+    assert flat.ok, flat.message
+    assert flat.marker("A")[1] == pytest.approx(0.1, abs=1e-12)
+    x = flat.marker("A")[0] + 2.0
+    length = np.hypot(x, 0.1)
+    pull = 50.0 * (length - 2.0) / length
+    assert flat.contacts == {"contacts.floor": pytest.approx(2.0 * G - pull * 0.1, rel=1e-8)}
+    hole = statics(_ball(hole=0.6))
+    place = hole.marker("A")
+    assert hole.ok, hole.message
+    assert np.hypot(*place) == pytest.approx(0.5, abs=1e-12)
+
+    def potential(angle: float) -> float:
+        at = 0.5 * np.array([np.cos(angle), np.sin(angle)])
+        return float(2.0 * G * at[1] + 25.0 * (np.hypot(*(at - [-2.0, 0.2])) - 2.0) ** 2)
+
+    best = minimize_scalar(potential, bounds=(-np.pi, 0.0), method="bounded", options={"xatol": 1e-12}).x
+    assert np.arctan2(place[1], place[0]) == pytest.approx(best, abs=1e-7)

@@ -33,7 +33,7 @@ class RestContacts:
         measured, of_pairs = gaps.measures, _measures(gaps.pairs)
         self._angles = measured.size
         joined = (np.concatenate(parts) for parts in zip(measured[2:], of_pairs[2:], strict=True))
-        self._measures = Forces(measured.space, measured.size + of_pairs.size, *joined)
+        self._measures = Forces(measured.dimensions, measured.size + of_pairs.size, *joined)
         kept = np.flatnonzero(gaps.kind != DRY)
         self.size = len(kept)
         is_pair = gaps.kind[kept] == PAIR
@@ -112,14 +112,14 @@ def _measures(pairs: Pairs) -> Forces:
     """Return pairs of surfaces as measures without a force: (b - a).n - r, or |b - a| less a sum or difference."""
     d, count = pairs.dimensions, pairs.size
     side = side_rows(d)
-    rows = pairs.rows[: count * pair_rows(d)].reshape(count, -1)
+    rows = pairs.rows[: count * pair_rows(d)].reshape(count, pair_rows(d))
     first, second, normal = rows[:, :d], rows[:, side : side + d], rows[:, 2 * side : 2 * side + d]
     none = np.full(count, -1, dtype=np.int64)
     law = np.zeros((count, LAW))
     reach = np.where(pairs.shape == HOLE, pairs.reach - pairs.radius, pairs.reach + pairs.radius)
     law[:, NATURAL], law[:, forces.SPEED] = np.where(pairs.shape == FLAT, pairs.radius, reach), 1.0
     kind = np.where(pairs.shape == FLAT, PLACE, DISTANCE)
-    return Forces((0,) * d, count, kind, np.hstack([second, first, normal]).ravel(), none, none, none, law.ravel())
+    return Forces(d, count, kind, np.hstack([second, first, normal]).ravel(), none, none, none, law.ravel())
 
 
 @njit(cache=True, error_model="numpy")
