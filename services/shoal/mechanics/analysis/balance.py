@@ -25,8 +25,9 @@ import scipy.sparse
 
 from shoal.mechanics.analysis.evaluate import Evaluation, Evaluator
 from shoal.mechanics.analysis.freedom import Freedom, Metric
+from shoal.mechanics.analysis.lanczos import lowest
 from shoal.mechanics.analysis.rest_contacts import RestContacts
-from shoal.mechanics.analysis.small_motions import ROUND, BoundedMatrix, Spectrum, parts_of
+from shoal.mechanics.analysis.small_motions import ROUND, BoundedMatrix, Spectrum, parts_of, spectrum
 from shoal.mechanics.analysis.sparse_freedom import SparseFreedom, SparseMetric
 from shoal.mechanics.numerics.newton import Root, newton
 from shoal.mechanics.numerics.tile import Array
@@ -193,7 +194,9 @@ class Balance:
     def spectrum_of(self, stiffness: BoundedMatrix, view: View, least: int = LOWEST) -> Spectrum:
         """Return the spectrum of a symmetric stiffness; of a large machine at least so many of the lowest."""
         parts = parts_of(self.evaluator.mass, view.evaluation.jacobian)
-        return view.freedom.spectrum(stiffness, self.evaluator.mass, parts, least)
+        if isinstance(view.freedom, SparseFreedom):
+            return lowest(view.freedom, stiffness, self.evaluator.mass, parts, least)
+        return spectrum(stiffness, view.basis, self.evaluator.mass, parts)
 
     def residual(self, view: View) -> float:
         """Unbalanced force over the elastic and the applied force, all in the metric of M^-1.

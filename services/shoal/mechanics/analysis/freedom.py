@@ -11,8 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy.linalg
 
-from shoal.mechanics.analysis.small_motions import BoundedMatrix, Spectrum, spectrum
-from shoal.mechanics.numerics.tile import Array, Index
+from shoal.mechanics.numerics.tile import Array
 
 RANK = 1e-8
 """A combination of constraints, each of unit length, that is shorter than this depends on the others."""
@@ -63,10 +62,6 @@ class Freedom(NamedTuple):
     def anywhere(self) -> Array:
         """Return a fixed combination of all free directions, long enough to leave a singular position."""
         return np.asarray(self.basis @ np.cos(1.0 + np.arange(self.degrees)))
-
-    def spectrum(self, stiffness: BoundedMatrix, mass: Any, parts: Index, least: int) -> Spectrum:
-        """Return the whole spectrum of a symmetric stiffness, see `small_motions`; least: modes that are asked for."""
-        return spectrum(stiffness, self.basis, mass, parts)
 
 
 class Metric:

@@ -8,7 +8,7 @@ of a round shaft, is missed. The values are then those of the stiffness in the s
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import scipy.linalg
@@ -23,10 +23,8 @@ from shoal.mechanics.analysis.small_motions import (
     graded,
     round_off,
 )
+from shoal.mechanics.analysis.sparse_freedom import Saddle, SparseFreedom
 from shoal.mechanics.numerics.tile import Array, Index
-
-if TYPE_CHECKING:
-    from shoal.mechanics.analysis.sparse_freedom import Saddle, SparseFreedom
 
 SPARE = 4
 """More motions are sought than asked for by so many: the last ones are the least accurate."""

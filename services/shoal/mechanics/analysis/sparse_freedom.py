@@ -17,8 +17,6 @@ import scipy.sparse
 import scipy.sparse.linalg
 
 from shoal.mechanics.analysis.freedom import RANK
-from shoal.mechanics.analysis.lanczos import lowest
-from shoal.mechanics.analysis.small_motions import BoundedMatrix, Spectrum
 from shoal.mechanics.numerics.tile import Array, Index
 
 WIDE = 100
@@ -200,10 +198,6 @@ class SparseFreedom:
     def factored(self, matrix: Any) -> Saddle:
         """Return the factors of a symmetric matrix along the free directions. Raises LinAlgError."""
         return Saddle(matrix, self._jacobian[self._kept], self._place, mass=self.mass)
-
-    def spectrum(self, stiffness: BoundedMatrix, mass: Any, parts: Index, least: int) -> Spectrum:
-        """Return the lowest part of the spectrum of a symmetric stiffness, see `lanczos.lowest`."""
-        return lowest(self, stiffness, mass, parts, least)
 
 
 class SparseMetric:
