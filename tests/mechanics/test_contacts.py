@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
 from shoal.errors import InputError
 from shoal.mechanics.simulate import simulate
 from shoal.scene import Scene
@@ -329,3 +330,26 @@ def test_a_start_within_a_surface_is_refused() -> None:
     scene = machine(POINT, {"C": {"first": {"body": "B"}, "second": FLOOR}}, {"position": [0.0, -0.1]}, 1.0)
     with pytest.raises(InputError, match=r"contacts\.C: the machine starts beyond this limit, at -0\.1"):
         simulate(scene, np.array([1.0]))
+
+
+@pytest.mark.slow  # compiles no more, but takes a second
+def test_a_thin_disc_rolls_and_wobbles_on_a_plane() -> None:
+    """Rolling equations in the semi-body frame and Newton-Euler with directors agree on these places to 3e-11."""
+    mass, radius = 1.0, 0.3
+    inertia = [mass * radius**2 / 2, mass * radius**2 / 4, mass * radius**2 / 4]
+    axle = np.array([0.2633697832234622, -0.8514029104439915, 0.4535961214255773])
+    across = np.cross(axle, [0.0, 0.0, 1.0]) / np.linalg.norm(np.cross(axle, [0.0, 0.0, 1.0]))
+    turn = np.stack([axle, across, np.cross(axle, across)], axis=1)
+    start = {"position": [0.0, 0.0, 0.26736220801843064], "rotation": Rotation.from_matrix(turn).as_rotvec().tolist(),
+             "spin": [-2.18926368267762, 8.430839665846014, -2.7455540527380435],
+             "velocity": [2.6110128946259517, 0.6957362087323377, 0.05443153457106936]}  # fmt: skip
+    body = {"kind": "rigid-body", "mass": mass, "inertia": inertia}
+    road = {"first": {"body": "B", "radius": radius, "axis": axle.tolist()}, "second": {"body": "ground", "plane": "z"},
+            "rolling": True}  # fmt: skip
+    scene = machine(body, {"road": road}, start, 4.0, dimensions=3, gravity=[0.0, 0.0, -G])
+    found = run(scene, 0.5, 1.0, 4.0)
+    expected = [[1.1398611167170902, 0.686002279087787, 0.26934210028369765],
+                [1.7223964854128155, 1.8815356650442918, 0.2715019974512399],
+                [-2.9050459249182494, 1.929708543357389, 0.2726863759712]]  # fmt: skip
+    np.testing.assert_allclose(found.points[:, 0, :, 0], expected, atol=1e-9)
+    assert found.model["events"] == []

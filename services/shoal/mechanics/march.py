@@ -355,7 +355,9 @@ def _advance(
                 again, aims = 0.5 * taken, 0
         if touches and again == taken:
             if aims == 0:
+                power = w.power[0]  # at the end of the step, where looking inside it leaves another
                 found = events.first(tile, scheme, m, w, k, now, taken, tolerance)
+                w.power[0] = power
                 if found <= 1.0:
                     again, aims = found * taken, 1
             elif aims <= AIMS:

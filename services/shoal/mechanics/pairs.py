@@ -1,10 +1,10 @@
 """Pairs of surfaces: gap, normal, slip and their derivatives, from the places and attitudes of both bodies.
 
 With x from the second place to the first, n the normal from the second surface to the first and r the radius of the
-first, the surfaces touch at x - r n. Their rate along a direction u is u.(v + w x arm) of the first less that of the
-second: of the normal that is the rate of the gap, of a tangent the slip. What the accelerations do not cause of its
-derivative by time is found with complex numbers: of a function of z + i h z', h -> 0, the imaginary part is h times the
-rate (Squire and Trapp 1998).
+first, the surfaces touch at x - r e, e = n of a sphere and of a disc the part of n across its axle. Their rate along a
+direction u is u.(v + w x arm) of the first less that of the second: of the normal that is the rate of the gap, of a
+tangent the slip. What the accelerations do not cause of its derivative by time is found with complex numbers: of a
+function of z + i h z', h -> 0, the imaginary part is h times the rate (Squire and Trapp 1998).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from shoal.mechanics.numerics.tile import Array, Index
 FLAT, ROUND, HOLE = 0, 1, 2
 """Shapes of the second surface: a line or plane, a circle or sphere (or a point), a hole."""
 _STEP = 1e-100
-MOST_ROWS = 27
+MOST_ROWS = 30
 ROOM = 3 * (MOST_ROWS + 2) + 10
 """Numbers that `describe` leaves of one pair in one lane."""
 
@@ -27,15 +27,17 @@ ROOM = 3 * (MOST_ROWS + 2) + 10
 class Pairs(NamedTuple):
     """Pairs of surfaces of one tile.
 
-    dimensions: d, of vectors. shape: of the second surface. turns: whether the bodies of the first and the second have
-    an attitude, two a pair. rows: of each pair the place of the first and its directors (one in the plane, three in
-    space), the same of the second, and the normal of a flat surface; any valid rows where there are none. radius: of
-    the first, and reach: the second's radius or zero [m], both (pairs, lanes).
+    dimensions: d, of vectors. shape: of the second surface. disc: whether the first is a disc in space. turns: whether
+    the bodies of the first and the second have an attitude, two a pair. rows: of each pair the place of the first and
+    its directors (one in the plane, three in space), the same of the second, the normal of a flat surface and the axle
+    of a disc; any valid rows where there are none. radius: of the first, and reach: the second's radius or zero [m],
+    both (pairs, lanes).
     """
 
     dimensions: int
     size: int
     shape: Index
+    disc: Index
     turns: Index
     rows: Index
     radius: Array
@@ -51,7 +53,7 @@ def side_rows(d: int) -> int:
 @njit(cache=True, forceinline=True)
 def pair_rows(d: int) -> int:
     """Rows of one pair."""
-    return 2 * side_rows(d) + d
+    return 2 * side_rows(d) + 2 * d
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -157,8 +159,18 @@ def describe(p: Pairs, number: int, width: int, lane: int, directions: int, z: A
     out[0] = gap
     for k in range(3):
         out[1 + k], out[4 + k], out[7 + k] = n[k].real, tangents[0][k].real, tangents[1][k].real
-    arm = _times(complex(-radius, 0.0), n)
-    far = _along(x, complex(-radius, 0.0), n)
+    towards = n
+    if p.disc[number] > 0:
+        axle = _vector(z, zdot, p.rows, first + 2 * half + d, d, width, lane)
+        axle = _times(1.0 / np.sqrt(_dot(axle, axle)), axle)
+        towards = _along(n, -_dot(n, axle), axle)
+        size = np.sqrt(_dot(towards, towards))
+        if size.real > 0.0:
+            towards = _times(1.0 / size, towards)
+        gap += radius * (1.0 - size.real)
+        out[0] = gap
+    arm = _times(complex(-radius, 0.0), towards)
+    far = _along(x, complex(-radius, 0.0), towards)
     for way in range(directions):
         u = n if way == 0 else (tangents[0] if way == 1 else tangents[1])
         at = 10 + way * (rows + 2)
@@ -166,6 +178,6 @@ def describe(p: Pairs, number: int, width: int, lane: int, directions: int, z: A
         total += _write(
             z, zdot, p, first + half, d, width, lane, -1.0, p.turns[2 * number + 1] > 0, u, far, out, at + half
         )
-        for k in range(d):
+        for k in range(2 * d):
             out[at + 2 * half + k] = 0.0
         out[at + rows], out[at + rows + 1] = total.real, total.imag / _STEP

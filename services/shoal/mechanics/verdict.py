@@ -166,7 +166,7 @@ class Limits:
         """Name the contact that could not be decided on, and when."""
         contact, outcome = divmod(trouble, coulomb.TROUBLES)
         field = self._model.gap_fields[contact]
-        return CONTACT_TROUBLES[outcome].found(f"{field} cannot be decided on at t = {time:.6g} s", time=time)
+        return CONTACT_TROUBLES[outcome].found(f"{field} ends the motion at t = {time:.6g} s", time=time)
 
     def _open(self, kind: Kind, numbers: Array, adaptive: bool) -> Finding:
         """Name the joint that no position closes, since when, and the likely causes."""

@@ -18,6 +18,8 @@ class ContactSurface(Attachment):
 
     radius: NonNegative = 0.0
     """Radius of a circle, in space of a sphere, about the place [m]; 0 of a point."""
+    axis: Axis | None = None
+    """Axle of a disc of that radius in space, as it points at the start, in place of a sphere [1]."""
     line: Angle | None = None
     """Angle [rad] in the body's frame of a line through the place, in the plane; the other body is on its left."""
     plane: Axis | None = None
@@ -35,6 +37,8 @@ class ContactSurface(Attachment):
         stated = ["radius"] * bool(np.any(self.radius)) + [name for name in SHAPES if getattr(self, name) is not None]
         if len(stated) > 1:
             raise ValueError(f"{stated[1]}: {stated[0]} is stated as well; a surface has one shape")
+        if self.axis is not None and not np.all(self.radius):
+            raise ValueError("axis: is that of a disc; state its radius")
         return self
 
 
@@ -70,6 +74,8 @@ class Contact(Record):
             raise ValueError(f"first.{self.first.shape}: the first side is a point or round; let this be the second")
         if self.first.body == self.second.body:
             raise ValueError(f"second.body: {self.second.body!r} is the first body as well; a contact needs two")
+        if self.second.axis is not None or (self.first.axis is not None and self.second.plane is None):
+            raise ValueError("axis: a disc is the first side, on a plane")
         if self.second.shape == "round" and not np.all(np.add(self.first.radius, self.second.radius) > 0.0):
             raise ValueError("second: is a point as the first side is; state a radius, a line, a plane or a hole")
         if self.second.hole is not None and not np.all(self.second.hole > self.first.radius):
@@ -96,6 +102,8 @@ def check_contacts(scene: Any) -> None:
             turns = kind == "rigid-body" or getattr(body, "element", "") == "rigid"
             if body is None or turns:
                 continue
+            if side.axis is not None:
+                raise ValueError(f"contacts.{name}.{field}.axis: {side.body} is no rigid body, which a disc needs")
             if side.shape in ("line", "plane"):
                 where = f"contacts.{name}.{field}.{side.shape}"
                 raise ValueError(f"{where}: {side.body} is no rigid body, which a flat surface needs")

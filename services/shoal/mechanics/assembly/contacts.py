@@ -41,8 +41,8 @@ class Contacts(Measures):
         self._numbers: list[tuple[Number, ...]] = []
         """Sign, restitution, tangential restitution, mu, mu_static and given friction of each contact."""
         self._rolls: list[bool] = []
-        self._pairs: list[tuple[int, list[int], list[int], Number, Number]] = []
-        """Shape, turning sides, rows, radius and reach of each pair of surfaces."""
+        self._pairs: list[tuple[int, bool, list[bool], list[int], Number, Number]] = []
+        """Shape, whether a disc, turning sides, rows, radius and reach of each pair of surfaces."""
         for name, joint in scene.joints.items():
             if isinstance(joint, Revolute | Slider):
                 self._stops(name, joint)
@@ -57,10 +57,10 @@ class Contacts(Measures):
     def gaps(self) -> Gaps:
         """Return the contacts as arrays."""
         size, rubs = len(self._each), [self._is_rough(k) for k in range(len(self._each))]
-        shapes, turns, rows, radii, reaches = zip(*self._pairs, strict=True) if self._pairs else ((),) * 5
+        shapes, discs, turns, rows, radii, reaches = zip(*self._pairs, strict=True) if self._pairs else ((),) * 6
         pairs = Pairs(
-            self.scene.dimensions, len(self._pairs), index(shapes), index(turns).ravel(), index(rows).ravel(),
-            stacked(radii), stacked(reaches),
+            self.scene.dimensions, len(self._pairs), index(shapes), index(discs),
+            index(turns).ravel(), index(rows).ravel(), stacked(radii), stacked(reaches),
         )  # fmt: skip
         numbers = [stacked(part) for part in zip(*self._numbers, strict=True)] if size else [stacked(())] * 6
         return Gaps(
@@ -145,19 +145,23 @@ class Contacts(Measures):
         normal = places[0]
         if shape == FLAT:
             normal = self.placement.line(second, second.line + math.pi / 2 if second.plane is None else second.plane)
+        axle = normal if first.axis is None else self.placement.line(first, first.axis)
         rows, turns = [], []
         for side, place in zip((first, second), places, strict=True):
-            directors = self._directors(side) if contact.rubs or shape == FLAT else []
+            directors = self._directors(side) if contact.rubs or shape == FLAT or first.axis is not None else []
             turns.append(bool(directors))
             rows += [place, *(directors or [place] * (1 if self.scene.dimensions == 2 else 3))]
         reach = second.radius if second.hole is None else second.hole
-        self._pairs.append((shape, turns, self.rows.of_all([*rows, normal]), first.radius, reach))
+        self._pairs.append(
+            (shape, first.axis is not None, turns, self.rows.of_all([*rows, normal, axle]), first.radius, reach)
+        )
         static = contact.mu if contact.mu_static is None else contact.mu_static
         self._add(
             f"contacts.{name}", PAIR, len(self._pairs) - 1, 1.0, restitution=contact.restitution,
             tangential=contact.tangential_restitution, mu=contact.mu, mu_static=static, rolls=contact.rolling,
         )  # fmt: skip
-        self._check(f"contacts.{name}", self._start_gap(shape, places, normal, first.radius, reach), 0.0, LOWER)
+        flat = None if first.axis is None else axle
+        self._check(f"contacts.{name}", self._start_gap(shape, places, normal, flat, first.radius, reach), 0.0, LOWER)
 
     def _directors(self, side: ContactSurface) -> list[Affine]:
         """Return vectors that turn with a body; none for the ground, point masses, and rods, which touch at a point."""
@@ -168,10 +172,15 @@ class Contacts(Measures):
             return []
         return [frame.directors[0]] if self.scene.dimensions == 2 else list(frame.directors)
 
-    def _start_gap(self, shape: int, places: list[Affine], normal: Affine, radius: Number, reach: Number) -> Number:
-        """Return the gap at the start [m]."""
+    def _start_gap(
+        self, shape: int, places: list[Affine], normal: Affine, axle: Affine | None, radius: Number, reach: Number
+    ) -> Number:
+        """Return the gap at the start [m]; axle: of a disc."""
         first, second, n = (self.placement.start_of(one)[0] for one in (*places, normal))
         if shape == FLAT:
-            return sum((first - second) * n) / np.sqrt(sum(n**2)) - radius
+            n = n / np.sqrt(sum(n**2))
+            a = 0.0 * n if axle is None else self.placement.start_of(axle)[0]
+            across = 1.0 if axle is None else np.sqrt(1.0 - sum(a * n) ** 2 / sum(a**2))
+            return sum((first - second) * n) - radius * across
         apart = np.sqrt(sum((first - second) ** 2))
         return reach - radius - apart if shape == HOLE else apart - radius - reach

@@ -28,7 +28,7 @@ PASSES = 10_000
 MOST = 100_000
 """Events after which a motion is given up."""
 STILL = 1e-12
-"""Rate after an impact, over the largest before it, that is none."""
+"""Rate of a contact, over the largest of a coordinate, that is round-off."""
 TOO_MANY, GAINS = 4, 5
 """Troubles beside the outcomes of `coulomb.decide`: more than `MOST` events; an impact that gains energy."""
 GAIN = 1e-9
@@ -186,7 +186,7 @@ def _impact(tile: Tile, m: Arrays, w: Work, t: float, lane: int, state: Array, p
     """
     g, width, size, ways = w.gaps, len(tile), m.gaps.size, 1 + m.gaps.tangents
     response.matrix(tile, m, w, lane, state)
-    fastest, rates, total = 0.0, np.zeros(size * ways), np.zeros(size * ways)
+    fastest, rates, total = _fastest(m, w, width, lane), np.zeros(size * ways), np.zeros(size * ways)
     for contact in range(size):
         at, first = contact * width + lane, contact * ways
         impulse[at] = 0.0
@@ -194,7 +194,6 @@ def _impact(tile: Tile, m: Arrays, w: Work, t: float, lane: int, state: Array, p
             continue
         for k in range(ways):
             rates[first + k] = g.rate[at] if k == 0 else g.slip[(first + k) * width + lane]
-            fastest = max(fastest, abs(rates[first + k]))
     for turn in range(PASSES):
         some = turn == 0
         for contact in range(size):
@@ -226,9 +225,20 @@ def _impact(tile: Tile, m: Arrays, w: Work, t: float, lane: int, state: Array, p
     response.push(tile, m, w, lane, w.zdot)
     for contact in range(size):
         at = contact * width + lane
-        impulse[at] = total[contact * ways]
+        first = contact * ways
+        strikes = total[first] * g.matrix[first * size * ways + first] > STILL * fastest
+        impulse[at] = total[first] if strikes else 0.0
         if state[at] != APART and m.gaps.kind[contact] != DRY and rates[contact * ways] > STILL * fastest:
             state[at] = SEPARATES
+
+
+@njit(cache=True, error_model="numpy")
+def _fastest(m: Arrays, w: Work, width: int, lane: int) -> float:
+    """Return the largest rate of a coordinate, against which slower rates of contacts are round-off."""
+    most = 0.0
+    for i in range(lane, m.unknowns * width, width):
+        most = max(most, abs(w.zdot[i]))
+    return most
 
 
 @njit(cache=True, error_model="numpy")
@@ -337,9 +347,7 @@ def _asked(tile: Tile, m: Arrays, w: Work, lane: int, contact: int, state: Array
         return OPEN
     if m.gaps.rubs[contact] == 0:
         return STICK
-    fastest, square, push = 0.0, 0.0, 0.0
-    for i in range(lane, m.unknowns * width, width):
-        fastest = max(fastest, abs(w.zdot[i]))
+    fastest, square, push = _fastest(m, w, width, lane), 0.0, 0.0
     for k in range(1, ways):
         row = (contact * ways + k) * width + lane
         square += g.slip[row] ** 2
