@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from shoal.engines import get_engine
 from shoal.engines.compare import compare
+from shoal.engines.mujoco.limits import damping_ratio
 from shoal.errors import InputError
 from shoal.mechanics.simulate import simulate
 from shoal.scene import Scene, load_scene
@@ -57,3 +61,48 @@ def test_the_planar_double_pendulum_is_the_native_one() -> None:
 def test_loops_are_refused_with_the_reason() -> None:
     with pytest.raises(InputError, match=r"cannot do closed loops; use gauss .*MuJoCo's are soft and open"):
         get_engine("mujoco").simulate(load_scene("n-four-bar-2"), TIMES)
+
+
+def stopped(dimensions: int, *, swapped: bool, step: float, restitution: float = 0.7) -> Scene:
+    """Return a body on a hinge between two stops, with the ground as the second side where it is swapped."""
+    flat = dimensions == 2
+    middle, end = ([x, 0.0, 0.0][:dimensions] for x in (0.5, 1.0))
+    body = {"kind": "rigid-body", "mass": 1.0, "inertia": 0.1 if flat else [0.1, 0.1, 0.1], "centre_of_mass": middle,
+            "named_points": {"end": end}}  # fmt: skip
+    sides: list[dict[str, Any]] = [{"body": "ground", "point": [0.0] * dimensions}, {"body": "B"}]
+    first, second = reversed(sides) if swapped else sides
+    hinge: dict[str, Any] = {"kind": "revolute", "first": first, "second": second,
+                             "stops": {"min": -0.8, "max": 0.4, "restitution": restitution}}  # fmt: skip
+    hinge |= {} if flat else {"axis": [0.0, 0.0, 1.0]}
+    return Scene.parse({"name": "stopped", "dimensions": dimensions, "gravity": [0.0, -9.81, 0.0][:dimensions],
+                        "bodies": {"B": body}, "joints": {"H": hinge}, "markers": {"P": {"body": "B", "point": "end"}},
+                        "solver": {"duration": 0.8, "step": step}})  # fmt: skip
+
+
+@pytest.mark.parametrize(("dimensions", "swapped"), [(2, False), (2, True), (3, False), (3, True)])
+def test_stops_are_limits_whose_error_falls_with_their_stiffness(dimensions: int, swapped: bool) -> None:
+    times, apart, stiff = np.linspace(0.0, 0.8, 41), [], []
+    for step in (1e-3, 5e-5):
+        scene = stopped(dimensions, swapped=swapped, step=step)
+        ours, theirs = (get_engine(name).simulate(scene, times) for name in ("gauss", "mujoco"))
+        assert theirs.ok, theirs.message
+        assert any(event["kind"] == "impact" for event in ours.model["events"])
+        apart.append(ours.distance(theirs))
+        stiff.append(theirs.model["limits"]["H"]["stiffness"])
+    assert stiff[1] == pytest.approx(400 * stiff[0])
+    assert apart[1] < 0.2 * apart[0]
+    assert apart[1] < 0.01
+
+
+@pytest.mark.parametrize("restitution", [0.9, 0.5, 0.2, 0.05])
+def test_a_limit_gives_back_what_the_stop_does(restitution: float) -> None:
+    """Spring and damper that push only, by scipy: the rate at which their force vanishes."""
+    ratio = damping_ratio(restitution)
+
+    def released(_: float, y: Any) -> float:
+        return float(-y[0] - 2.0 * ratio * y[1]) if y[1] > 0.0 else 1.0
+
+    released.terminal = True  # type: ignore[attr-defined]
+    way = solve_ivp(lambda _, y: [y[1], -y[0] - 2.0 * ratio * y[1]], (0.0, 50.0), [0.0, -1.0], events=released,
+                    rtol=1e-10, atol=1e-12)  # fmt: skip
+    assert way.y[1, -1] == pytest.approx(restitution, abs=1e-6)

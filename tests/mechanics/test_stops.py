@@ -216,5 +216,5 @@ def test_what_knows_no_stops_says_so() -> None:
         reactions(rod(), [0.1])
     with pytest.raises(InputError, match=r"solver\.integrator: radau5 knows no contacts, as of joints\.O\.stops"):
         simulate(rod(integrator="radau5"), np.array([1.0]))
-    with pytest.raises(InputError, match=r"joints\.O\.stops: engine exudyn cannot do stops; use gauss"):
+    with pytest.raises(InputError, match=r"joints\.O\.stops: engine exudyn cannot do stops; use gauss or mujoco"):
         get_engine("exudyn").simulate(rod(), np.array([1.0]))

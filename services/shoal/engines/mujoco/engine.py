@@ -1,4 +1,4 @@
-"""MuJoCo behind the engine contract: open chains of rigid bodies, without contacts and limits."""
+"""MuJoCo behind the engine contract: open chains of rigid bodies, without contacts; stops are limits that give way."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class MujocoEngine(OneByOne):
             elements=frozenset({"rigid"}),
             joints=frozenset({"revolute", "spherical", "slider", "weld"}),
             loads=frozenset(),
-            features=frozenset({"machines in space"}),
+            features=frozenset({"machines in space", "stops"}),
             lanes=False,
         )
 
@@ -62,14 +62,14 @@ class MujocoEngine(OneByOne):
         except InputError as error:
             soft = "; MuJoCo's are soft and open" if "closed loops" in str(error) else ""
             raise InputError(f"{error}{soft}") from None
-        return self.run(Mjcf(scene), wanted, started)
+        return self.run(Mjcf(scene, stops=True), wanted, started)
 
     def run(self, machine: Mjcf, wanted: Array, started: float | None = None) -> Trajectory:
         """Run what MJCF says, soft constraints and all: their energy and the work of loads are not followed."""
         started = time.perf_counter() if started is None else started
         mujoco, scene = library(), machine.scene
         model, data = loaded(mujoco, machine)
-        followed = not (model.neq or model.nu or scene.loads or np.any(model.dof_frictionloss))
+        followed = not (model.neq or model.nu or scene.loads or machine.limits or np.any(model.dof_frictionloss))
         with quiet(mujoco):
             points, angles, drift, steps = _march(mujoco, model, data, scene, wanted)
         found: list[Finding] = []
@@ -77,6 +77,8 @@ class MujocoEngine(OneByOne):
             found = [kinds.NOT_FINITE.found("the motion is not finite", "use a smaller solver.step")]
         elif followed and not drift <= scene.solver.energy_tolerance:
             found = [kinds.ENERGY.found(f"energy is off by {drift:.3g}", "reduce solver.step", drift=drift)]
+        stiff = {name: one._asdict() for name, one in machine.limits.items()}
+        started_as = facts(scene, machine.initial, span(scene)) | ({"limits": stiff} if stiff else {})
         return Trajectory(
             engine=self.name,
             times=wanted,
@@ -89,7 +91,7 @@ class MujocoEngine(OneByOne):
             wall_s=time.perf_counter() - started,
             lane_findings=[found],
             model={"mujoco": mujoco.__version__, "unknowns": int(model.nv), "constraints": int(model.neq),
-                   "integrator": "rk4", "step": scene.solver.step} | facts(scene, machine.initial, span(scene)),
+                   "integrator": "rk4", "step": scene.solver.step} | started_as,
         )  # fmt: skip
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from shoal.engines.capabilities import check_acceleration
+from shoal.engines.mujoco.limits import Limit, limit_of, start_of_hinges
 from shoal.engines.mujoco.links import Freedom, LinkTree, TreeLink, local, where
 from shoal.engines.mujoco.refused import require_counterparts
 from shoal.engines.tree.scene import started
@@ -52,10 +53,14 @@ class Mjcf:
     text: the file; rates: of MuJoCo's joints at the start; soft: joints and the like that its soft constraints keep
     """
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Scene, *, stops: bool = False) -> None:
+        """stops: whether those of joints are written, as limits that give way."""
         check_acceleration(scene)
-        require_counterparts(scene)
+        require_counterparts(scene, stops=stops)
         self.scene = scene
+        self.limits: dict[str, Limit] = {}
+        limited = any(getattr(joint, "stops", None) is not None for joint in scene.joints.values())
+        self._hinges = start_of_hinges(scene) if limited else {}
         self._size = span(scene)
         self._begin, self._axis, self.initial = started(scene)
         self.soft: list[str] = []
@@ -147,6 +152,9 @@ class Mjcf:
         joint: Any = self.scene.joints.get(link.joint)
         if (kind == "hinge" and isinstance(joint, Revolute)) or (kind == "slide" and isinstance(joint, Slider)):
             options |= self._forces(link, joint)
+            if joint.stops is not None:
+                self.limits[link.joint] = self._limit(link, joint, axis)
+                options |= self.limits[link.joint].attributes
         _under(element, "joint", **options)
         speed = own.speed(link.place) - parent.speed(link.place)
         self.rates += {"slide": [speed @ axis], "hinge": [turning @ axis], "ball": [*(own.axes.T @ turning)]}[kind]
@@ -164,6 +172,16 @@ class Mjcf:
         }
         sticking = {"solreffriction": self._stiff()["solref"]} if joint.coulomb else {}
         return {name: repr(float(value)) for name, value in found.items() if value} | sticking
+
+    def _limit(self, link: TreeLink, joint: Revolute | Slider, axis: Any) -> Limit:
+        """Return the limit that stands for the stops of a joint."""
+        assert joint.stops is not None
+        if isinstance(joint, Revolute):
+            start = self._hinges[link.joint]
+        else:
+            first, second = (where(self.scene, self._begin, side) for side in (joint.first, joint.second))
+            start = float((second - first) @ axis)
+        return limit_of(joint.stops, start, 1.0 if link.name == joint.second.body else -1.0, self.scene.solver.step)
 
     def _shapes(self, element: ElementTree.Element, name: str) -> None:
         """Add the visible geometry of a body: a rod's cuboid, or lines from the centre to its points."""

@@ -24,8 +24,11 @@ LOADS = (Spring, TorsionSpring, Force, Torque)
 """Kinds that have a counterpart in MJCF."""
 
 
-def require_counterparts(scene: Scene) -> None:
-    """Raises InputError that names a feature of a scene without a counterpart, of those seen without its tree."""
+def require_counterparts(scene: Scene, *, stops: bool = False) -> None:
+    """Raises InputError that names a feature of a scene without a counterpart, of those seen without its tree.
+
+    stops: whether those of joints are accepted
+    """
     for name, body in scene.bodies.items():
         if name == "world":
             raise InputError("bodies.world: MJCF calls the ground so; give the body another name")
@@ -46,7 +49,7 @@ def require_counterparts(scene: Scene) -> None:
             raise InputError(f"joints.{name}.mu: MJCF has no friction by the force of a joint")
         if isinstance(joint, Revolute | Slider) and joint.drag:
             raise InputError(f"joints.{name}.drag: MJCF has no quadratic drag of a joint")
-        if isinstance(joint, Revolute | Slider) and joint.stops is not None:
+        if isinstance(joint, Revolute | Slider) and joint.stops is not None and not stops:
             raise InputError(f"joints.{name}.stops: not written as MJCF; there its limits would give way")
         if isinstance(joint, Distance) and joint.keeps != "exactly":
             raise InputError(f"joints.{name}.keeps: not written as MJCF; there a limit of a length would give way")
