@@ -17,10 +17,11 @@ import time
 from typing import Any
 
 import numpy as np
-from numba import carray, njit
+from numba import carray, njit, typeof, types
 
 from shoal.compile import function_pointers, simd, structures
-from shoal.compile.pointers import pointer
+from shoal.compile.pointers import pointer, raw_type
+from shoal.compile.structures import Reference
 from shoal.mechanics import constraints, kernels
 from shoal.mechanics import contact_events as events
 from shoal.mechanics.derived import derive
@@ -84,7 +85,8 @@ class March:
         arrays = seen(frame.arrays)
         structures.write(arrays.storage, arrays)
         structures.write(frame.room.storage, frame.room)
-        structures.write(self._storage, frame._replace(arrays=arrays))
+        event = _first_event(frame) if arrays.gaps.size > 0 and len(frame.tile) == 1 else 0
+        structures.write(self._storage, frame._replace(arrays=arrays, first_event=event))
         width = len(frame.tile)
         if width not in _LOOPS:
             _LOOPS[width] = function_pointers.address(loop, (frame_type(frame),))
@@ -125,6 +127,18 @@ class March:
 
 _LOOPS: dict[int, int] = {}
 """Addresses of the compiled loops, by the width of a tile."""
+
+
+def event_kernel(frame: Frame) -> kernels.Kernel:
+    """Return the kernel that finds the first event within a step, for machines with contacts, with its types."""
+    parts = frame.scheme, seen(frame.arrays), frame.room, frame.own
+    number = types.float64
+    kinds = typeof(frame.tile), *(Reference(raw_type(typeof(part))) for part in parts), number, number, number
+    return events.first, kinds
+
+
+def _first_event(frame: Frame) -> int:
+    return kernels.address(("first event", len(frame.tile)), lambda: event_kernel(frame))
 
 
 def march(*arguments: Any) -> Marched:
@@ -180,7 +194,7 @@ def loop(frame):  # type: ignore[no-untyped-def]
         rest = step if whole and not (free or halted) else target - now
         sampling = sample < len(times) and (free or times[sample] < now + step * (1 - 1e-9))
         begin = now
-        taken = _advance(tile, scheme, m, w, k, halts, now, rest, snap, tolerance, sampling)
+        taken = _advance(tile, scheme, m, w, k, halts, frame.first_event, now, rest, snap, tolerance, sampling)
         if m.gaps.size > 0 and len(tile) > 1 and events.approach(tile, m, w, taken):
             own[DONE] = 1.0
             break
@@ -324,6 +338,7 @@ def _advance(
     w: Work,
     k: LoopRoom,
     halts: Halts,
+    first_event: int,
     now: float,
     rest: float,
     snap: float,
@@ -332,7 +347,7 @@ def _advance(
 ) -> float:
     """One step of at most `rest` [s], shorter where it would leap over a part of a force law; returns its length.
 
-    keep: whether the motion inside it will be needed.
+    first_event: address of `event_kernel`. keep: whether the motion inside it will be needed.
     """
     end = m.unknowns * len(tile)
     watched, touches = halts.marks.size > 0, m.gaps.size > 0 and len(tile) == 1
@@ -356,7 +371,8 @@ def _advance(
         if touches and again == taken:
             if aims == 0:
                 power = w.power[0]  # at the end of the step, where looking inside it leaves another
-                found = events.first(tile, scheme, m, w, k, now, taken, tolerance)
+                arguments = (scheme, m, w, k, now, taken, tolerance)
+                found = function_pointers.ask(first_event, (tile, *arguments))
                 w.power[0] = power
                 if found <= 1.0:
                     again, aims = found * taken, 1

@@ -127,7 +127,8 @@ class Frame(NamedTuple):
     step: [s], of schemes of fixed step, which take `steps` of them; adaptive ones end at the last of the times and take
     at most that number. times: at which the marker rows are sampled [s], increasing, `samples` of them; directed:
     number of marker rows; halts: where steps end, `stops` times and `marks` marks; there forces may jump, and driven
-    constraints their rates. tolerance: from which rows count as dependent. What is not reached stays nan in the record.
+    constraints their rates. tolerance: from which rows count as dependent. first_event: address of the kernel of
+    `contact_events.first`, 0 for machines without contacts. What is not reached stays nan in the record.
     """
 
     tile: Tile
@@ -146,6 +147,7 @@ class Frame(NamedTuple):
     stops: int
     marks: int
     tolerance: float
+    first_event: int = 0
 
 
 def framed(

@@ -30,7 +30,7 @@ from shoal.mechanics.assembly.build import build
 from shoal.mechanics.dynamics import work_space
 from shoal.mechanics.integrators import INTEGRATORS, choose, facts, halting
 from shoal.mechanics.integrators.scheme import connect, signatures
-from shoal.mechanics.march import loop
+from shoal.mechanics.march import event_kernel, loop
 from shoal.mechanics.marched import frame_type, framed
 from shoal.mechanics.numerics.tile import SINGLE, tiles
 from shoal.mechanics.simulate import simulate
@@ -153,6 +153,8 @@ def required(scene: Scene, lanes: int, *, every: bool = False) -> list[KernelSig
     frame = framed(tile, scheme, arrays, room, 0.0, 0, np.zeros(1), model.marker_rows.ravel(), 0.0, stops)
     found = [(loop, (frame_type(frame),)), *steps]
     found += kernels.signatures(tile, arrays, room, every=every)
+    if arrays.gaps.size > 0 and tile == SINGLE:
+        found.append(event_kernel(frame))
     if every:  # limits of stability
         found += tangent.signatures(tile, arrays, room)
     if every and tile == SINGLE:  # statics, modes and reactions
