@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 import shoal
-from scipy.integrate import solve_ivp
+from scipy.integrate import quad, solve_ivp
+from scipy.special import ellipj, ellipk
 from shoal.engines.event_words import compare
 from shoal.scene import Scene
 
@@ -57,7 +58,7 @@ def test_a_stop_that_is_just_met_or_missed_is_told_with_its_margin(short: float)
         assert abs(short) * HIGH <= one["margin"] + one["error"]
     # x(t) = x_free(t + 2 dt) after it, dt the time from the stop to the amplitude.
     shift = 2.0 * np.sqrt(2.0 * max(short, 0.0) * HIGH / (PULL * np.sin(HIGH)))
-    way = solve_ivp(lambda _, y: [y[1], -PULL * np.sin(y[0])], (0.0, 2.0), [HIGH, 0.0], "DOP853", rtol=1e-13,
+    way: Any = solve_ivp(lambda _, y: [y[1], -PULL * np.sin(y[0])], (0.0, 2.0), [HIGH, 0.0], "DOP853", rtol=1e-13,
                     atol=1e-14, dense_output=True)  # fmt: skip
     late = run.times > 0.9
     true = way.sol(run.times[late] + shift)[0] + DOWN
@@ -65,6 +66,32 @@ def test_a_stop_that_is_just_met_or_missed_is_told_with_its_margin(short: float)
     known = run.errors.total
     assert known is not None
     assert away <= known + 1e-11
+
+
+@pytest.mark.slow
+def test_no_near_miss_is_silently_wrong() -> None:
+    """At random distances and tolerances; true motions by elliptic functions."""
+    rng, k, rate = np.random.default_rng(0), np.sin(HIGH / 2), np.sqrt(PULL)
+    quarter, told = ellipk(k**2) / rate, 0
+    for _ in range(100):
+        short = float(rng.choice([1.0, 1.0, -1.0]) * 10.0 ** rng.uniform(-13, -3))
+        tolerance = float(10.0 ** rng.uniform(-12, -4))
+        solver = {"relative_tolerance": tolerance, "absolute_tolerance": tolerance / 10}
+        run = shoal.simulate(rod(-HIGH * (1.0 - short), 1.0, duration=float(rng.uniform(1.0, 4.0)), **solver))
+        # cd(u) = 1 - c at the stop, whose time before the amplitude is an integral over a small angle.
+        c = 2 * np.cos(HIGH / 2 - HIGH * short / 4) * np.sin(HIGH * max(short, 0.0) / 4) / np.sin(HIGH / 2)
+        angle = 2 * np.arcsin(np.sqrt(c / 2))
+        sooner = quad(lambda a: 1 / np.sqrt(1 - (k * np.cos(a)) ** 2), 0, angle, epsabs=0, epsrel=1e-12)[0] / rate
+        hit = 2 * quarter - sooner
+        phase = run.times % (2 * hit)
+        time = np.where(phase <= hit, phase, 2 * hit - phase) if short > 0 else run.times
+        _, cn, dn, _ = ellipj(rate * time, k**2)
+        true = 2 * np.arcsin(k * cn / dn) + DOWN
+        away = np.max(np.hypot(*(run.points[:, 0, :, 0].T - np.array([np.cos(true), np.sin(true)]))))
+        assert run.errors.total is not None
+        assert not run.ok or away <= run.errors.total + 1e-13, (short, tolerance, run.message)
+        told += "near-grazing" in [one.code for one in run.findings]
+    assert 20 < told < 80
 
 
 def balls(late: float, kept: float = 0.5) -> Scene:

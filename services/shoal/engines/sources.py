@@ -177,7 +177,8 @@ def in_time(seen: Examined) -> tuple[list[Deviation] | None, str]:
     # reasons than its tolerance has the same ones in both: a tighter one with shorter steps tells.
     tighter, note = seen.careful("time", lambda: ways.careful(seen.scene, seen.run, TIGHTER))
     if tighter is not None and tighter.run.ok:
-        return [seen.deviation("time", tighter)], ""
+        # The error falls at least in proportion to the tolerance, of which this part is gone.
+        return [seen.deviation("time", tighter, 1.0 / (1.0 - TIGHTER))], ""
     if chaotic:
         return [found], ""
     return None, note or "time error not estimated: the run with shorter steps is rejected"

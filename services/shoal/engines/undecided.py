@@ -18,7 +18,7 @@ import numpy as np
 from shoal.engines.deviation import Deviation
 from shoal.engines.event_words import Event
 from shoal.mechanics.event_record import place_of
-from shoal.mechanics.gap_history import GapHistory, event_times, follow, instants
+from shoal.mechanics.gap_history import GapHistory, follow, instants
 from shoal.trajectory import Array
 
 GRAZING, ORDER, TOGETHER = "near-grazing", "order-of-impacts", "simultaneous"
@@ -59,30 +59,25 @@ class Undecided:
 def undecided(deviation: Deviation) -> list[Undecided] | None:
     """Return the first open decision on every gap; None where the runs are too large to be followed.
 
-    deviation: of runs of the native engine in time. Raises InputError.
+    Where one run meets a limit that the other misses, the margin of either is less than their distance. deviation: of
+    runs of the native engine in time. Raises InputError.
     """
     runs = deviation.one, deviation.other
-    times, events = (np.union1d(*map(each, runs)) for each in (instants, event_times))
-    one, other = (follow(scene, times, events) for scene in deviation.scenes)
+    times = np.union1d(*map(instants, runs))
+    one, other = (follow(scene, times, run) for scene, run in zip(deviation.scenes, runs, strict=True))
     if one is None or other is None:
         return None
     apart = deviation.factor * np.maximum.accumulate(np.abs(one.value - other.value), axis=0)
-    error = np.maximum(apart, one.resolution)
-    found = [
-        each
-        for history, run in zip((one, other), runs, strict=True)
-        for each in (*_grazes(history, run.model["events"], error), *_orders(history, run.model["events"], error))
-    ]
-    # Beyond the first event that one run does not have their distance is no error.
+    error, events = np.maximum(apart, one.resolution), deviation.one.model["events"]
+    found = sorted((*_grazes(one, events, error), *_orders(one, events, error)), key=lambda one: one.time)
+    # Beyond the first event that one run does not have their distance is no error, but for what that event is about.
     parting = deviation.events
+    concerned = {place_of(event) for event in parting.differs if event is not None}
+    late = next((each for each in found if each.time > parting.until and concerned & {*each.joints}), None)
     first: dict[tuple[str, tuple[int, ...]], Undecided] = {}
-    for each in sorted(found, key=lambda one: one.time):
-        if each.time <= parting.until:
+    for each in found:
+        if each.time <= parting.until or each is late:
             first.setdefault((each.what, tuple(each.shift)), each)
-    if not first and parting.differs:
-        concerned = {place_of(event) for event in parting.differs if event is not None}
-        about = sorted((one for one in found if concerned & {*one.joints}), key=lambda one: one.time)
-        return about[:1]
     return list(first.values())
 
 

@@ -11,7 +11,7 @@ from shoal.mechanics.analysis import evaluations
 from shoal.mechanics.gaps import shifted
 from shoal.mechanics.integrators import facts
 from shoal.mechanics.machine import Machine
-from shoal.mechanics.numerics.tile import SINGLE, Array
+from shoal.mechanics.numerics.tile import SINGLE, Array, Flags
 from shoal.mechanics.runs import Runs
 from shoal.mechanics.simulate import runs, simulate
 from shoal.mechanics.workspace import at_start
@@ -30,12 +30,13 @@ ROOM = 2**25
 class GapHistory:
     """Gaps of a run at instants close enough to see every approach.
 
-    times [s]: (samples,); events: those of them at which contacts of any gap close or open, where rates are those
-    before; fields: what states the gaps; value [m or rad], rate: (samples, gaps). resolution: gaps below it are closed
+    times [s]: (samples,); smooth: which of them are not at an event of any gap, or so soon after it that rates may be
+    those before, (samples,); fields: what states the gaps; value [m or rad], rate: (samples, gaps). resolution: gaps
+    below it are closed
     """
 
     times: Array
-    events: Array
+    smooth: Flags
     fields: tuple[str, ...]
     value: Array
     rate: Array
@@ -53,8 +54,7 @@ class GapHistory:
         """
         left, right = self.rate[:-1, gap], self.rate[1:, gap]
         open_ = self.value[:, gap] > self.resolution
-        smooth = ~np.isin(self.times[:-1], self.events)
-        k = np.flatnonzero((left < 0.0) & (right > 0.0) & open_[:-1] & open_[1:] & smooth)
+        k = np.flatnonzero((left < 0.0) & (right > 0.0) & open_[:-1] & open_[1:] & self.smooth[:-1])
         step = self.times[k + 1] - self.times[k]
         a, b = self.rate[k, gap] * step, self.rate[k + 1, gap] * step
         rise = self.value[k + 1, gap] - self.value[k, gap]
@@ -77,23 +77,27 @@ def instants(run: Trajectory) -> Array:
     They are parts of its steps, its events, at which the rates are those before, and instants AFTER these.
     """
     end, parts = float(run.times[-1]), PARTS if facts(run.model["integrator"]).adaptive else 1
-    ends = np.unique(np.concatenate([[0.0], event_times(run), [end]]))
+    ends, after = _stretches(run)
     grid = np.linspace(0.0, end, parts * run.steps + 1)
-    between = np.concatenate([ends[:-1] + part * np.diff(ends) for part in (AFTER, 0.5)])
+    between = np.concatenate([after, 0.5 * (ends[1:] + ends[:-1])])
     found = np.unique(np.concatenate([grid, ends, between, run.times]))
     return np.asarray(found[found <= end])
 
 
-def event_times(run: Trajectory) -> Array:
-    """Times [s] of the events at which contacts close and open."""
-    return np.unique([event["time"] for event in run.model["events"] if event["kind"] != "rests"])
+def _stretches(run: Trajectory) -> tuple[Array, Array]:
+    """Return the times of events, with the beginning and the end, and when rates after each but the last are known."""
+    times = [event["time"] for event in run.model["events"] if event["kind"] != "rests"]
+    ends = np.unique([0.0, *times, float(run.times[-1])])
+    after = ends[:-1] + AFTER * np.diff(ends)
+    if 0.0 not in times:
+        after[0] = 0.0
+    return ends, after
 
 
-def follow(scene: Scene, times: Array, events: Array) -> GapHistory | None:
+def follow(scene: Scene, times: Array, run: Trajectory) -> GapHistory | None:
     """Return the gaps of a run of a scene at given times, from 0 on; None of one that is too large.
 
-    events: at which contacts close and open [s]. The run is made again: what samples it does not change it. Raises
-    InputError.
+    The run is made again: what samples it does not change it. Raises InputError.
     """
     machine = Machine.of(scene)
     model = runs(machine, scene.solver, float(times[-1])).model
@@ -103,7 +107,10 @@ def follow(scene: Scene, times: Array, events: Array) -> GapHistory | None:
     arrays, room = at_start(states.model, SINGLE, slice(0, 1))
     evaluations.enter(arrays, room)
     value, rate = evaluations.follow_gaps(SINGLE, arrays, room, states.q[..., 0], states.v[..., 0])
-    return GapHistory(times, events, model.gap_fields, value, rate, model.gaps.resolution)
+    ends, after = _stretches(run)
+    last = np.searchsorted(ends, times, side="right") - 1
+    smooth = times >= np.append(after, np.inf)[last]
+    return GapHistory(times, smooth, model.gap_fields, value, rate, model.gaps.resolution)
 
 
 def moved(scene: Scene, times: Array, shifts: Mapping[int, float]) -> Trajectory:
