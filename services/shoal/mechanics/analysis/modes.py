@@ -25,18 +25,16 @@ from shoal.mechanics.analysis import modes_findings as kinds
 from shoal.mechanics.analysis.at_rest import at_start
 from shoal.mechanics.analysis.balance import BALANCED, Balance
 from shoal.mechanics.analysis.damped import small
-from shoal.mechanics.analysis.equilibrium import Equilibrium
 from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.analysis.going_on import as_stated
 from shoal.mechanics.analysis.modes_findings import ModesStatus, status_of
 from shoal.mechanics.analysis.movers import movers
 from shoal.mechanics.analysis.singular import crossing
 from shoal.mechanics.analysis.small_motions import hides, pull
-from shoal.mechanics.analysis.statics import statics
+from shoal.mechanics.analysis.statics import seek
 from shoal.mechanics.analysis.steady import EXACT, NotSteadyError, Steady, steady_motion
 from shoal.mechanics.analysis.whirl import whirls
 from shoal.mechanics.assembly.coordinates import Placement
-from shoal.mechanics.ended import start_angles
 from shoal.mechanics.machine import Machine
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
@@ -306,10 +304,12 @@ def modes_at_rest(
 ) -> Modes:
     """The lowest modes of a machine at rest, of whose start the rates are left out."""
     if about == "equilibrium":
-        equilibrium = statics(scene, time, leave_unstable=leave_unstable, reactions=False)
+        equilibrium, balance = seek(scene, time, leave_unstable=leave_unstable, reactions=False)
         if not equilibrium.balanced:
             raise ComputationError(f"{scene.name}: no equilibrium to vibrate about: {equilibrium.explanation}")
-        return modes_about(equilibrium, count=count)
+        balance.left_out = balance.left_out[:0]
+        remarks = [kinds.ABOUT_DOUBTED.found(one.text) if one.kind.implies else one for one in equilibrium.findings]
+        return _modes(balance, scene, equilibrium.q, count, "equilibrium", remarks)
     evaluator = at_start(scene, horizon=time)
     balance = _balance(scene, evaluator, time)
     q, gap = balance.restore(evaluator.model.q0[:, 0].copy())
@@ -350,17 +350,6 @@ def modes_of_motion(
 def _friction(scene: Scene) -> list[Finding]:
     dry = left_out.friction(scene, None)
     return [kinds.FRICTION_LEFT_OUT.found(dry)] if dry else []
-
-
-def modes_about(equilibrium: Equilibrium, *, count: int = 10) -> Modes:
-    """The `count` lowest modes about an equilibrium. Raises ComputationError where it is singular."""
-    scene, time = equilibrium.scene, equilibrium.time
-    evaluator = Evaluator(Machine.of(scene).model(time), one_sided=True)
-    evaluator.turns = start_angles(evaluator.model, [equilibrium.turns])[:, 0]
-    remarks = [kinds.ABOUT_DOUBTED.found(one.text) if one.kind.implies else one for one in equilibrium.findings]
-    balance = _balance(scene, evaluator, time)
-    balance.contacts.angles = equilibrium.gap_angles
-    return _modes(balance, scene, equilibrium.q, count, "equilibrium", remarks)
 
 
 def _balance(scene: Scene, evaluator: Evaluator, time: float) -> Balance:

@@ -71,8 +71,16 @@ def statics(scene: Scene, time: float = 0.0, *, leave_unstable: bool = True, rea
 
     Raises InputError if the scene cannot be modelled.
     """
+    return seek(scene, time, leave_unstable=leave_unstable, reactions=reactions)[0]
+
+
+def seek(
+    scene: Scene, time: float = 0.0, *, leave_unstable: bool = True, reactions: bool = True
+) -> tuple[Equilibrium, Balance]:
+    """Return the equilibrium as `statics` does, and the balance of forces that was looked at there last."""
     check(time=time)
-    return _Search(scene, as_stated(scene, horizon=time), time, reactions).run(leave_unstable)
+    search = _Search(scene, as_stated(scene, horizon=time), time, reactions)
+    return search.run(leave_unstable), search.balance
 
 
 class _Search:

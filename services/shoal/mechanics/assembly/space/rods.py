@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from shoal.errors import InputError
@@ -18,14 +20,14 @@ from shoal.mechanics.frames import BeamFrame
 from shoal.mechanics.joints import Turned
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.start.strained import gives_way, require_numbers
-from shoal.scene import GROUND, Rod, Scene
+from shoal.scene import GROUND, Attachment, Rod, Scene
 
 
 def place_rod(scene: Scene, name: str, rod: Rod, mine: list[JointPoint], pose: Pose, result: SpatialPlacement) -> None:
     """Give a rod its nodes; they start unstrained, if joints allow it. Raises InputError where they cannot."""
     element = result.elements[name]
     shared, inner = joint_nodes(name, rod, mine)
-    strained = gives_way(scene)
+    strained, clamps = gives_way(scene), _ground_clamps(scene, name, rod, result)
     known = {node: result.start_of(point.where)[0] for node, point in shared.items() if point.where is not None}
     guess = guessed(scene, name, rod, pose, known, result) if strained else []
     result.strained |= {(name, node): one.turn for node, one in enumerate(guess)}
@@ -48,7 +50,7 @@ def place_rod(scene: Scene, name: str, rod: Rod, mine: list[JointPoint], pose: P
         ]
         if strained:
             vectors = [(turns.turned(guess[node].turn, value), rate) for value, rate in vectors]
-        nodes.append((position, *_directions(scene, name, rod, node, vectors, result)))
+        nodes.append((position, *_directions(scene, name, rod, node, vectors, result, clamps.get(node, []))))
     frame = BeamFrame(name, element, rod.length, tuple(nodes))
     result.frames[name] = frame
     for point in [*shared.values(), *inner]:
@@ -59,12 +61,13 @@ def place_rod(scene: Scene, name: str, rod: Rod, mine: list[JointPoint], pose: P
 
 
 def _directions(
-    scene: Scene, name: str, rod: Rod, node: int, vectors: list[tuple[Array, Array]], result: SpatialPlacement
-) -> list[Affine]:
+    scene: Scene, name: str, rod: Rod, node: int, vectors: list[tuple[Array, Array]], result: SpatialPlacement,
+    clamps: list[_Clamp],
+) -> list[Affine]:  # fmt: skip
     """The vectors of a node besides its place: a clamp on the ground or an axis shared with a joint holds some."""
     element = result.elements[name]
     (value, rate), *others = vectors
-    if clamp := _ground_clamp(scene, name, rod, node, result):
+    if clamp := _ground_clamp(scene, clamps, result):
         if np.any([turning for _, turning in vectors]):
             raise InputError(f"initial.{name}.spin: a rod welded to the ground does not turn there; leave it out")
         result.held.add(clamp)
@@ -94,8 +97,18 @@ def _directions(
     ]
 
 
-def _ground_clamp(scene: Scene, name: str, rod: Rod, node: int, result: SpatialPlacement) -> str | None:
-    """The joint that welds a node to the ground as the rod starts."""
+class _Clamp(NamedTuple):
+    """A condition that holds the direction of a rod against what is fixed to the ground. side: of the rod."""
+
+    joint: str
+    condition: Turned
+    side: Attachment
+    other: Attachment
+
+
+def _ground_clamps(scene: Scene, name: str, rod: Rod, result: SpatialPlacement) -> dict[int, list[_Clamp]]:
+    """Return those of a rod by node."""
+    found: dict[int, list[_Clamp]] = {}
     for joint, condition in joints.of_scene(scene):
         if not isinstance(condition, Turned) or condition.driven:
             continue
@@ -103,12 +116,18 @@ def _ground_clamp(scene: Scene, name: str, rod: Rod, node: int, result: SpatialP
         others = [side for side in (condition.first, condition.second) if side.body != name]
         if len(mine) != 1 or result.attitudes.kept.root(others[0].body)[0] != GROUND:
             continue
-        if node_of(rod, scene.location(mine[0])) != node:
-            continue
+        if (node := node_of(rod, scene.location(mine[0]))) is not None:
+            found.setdefault(node, []).append(_Clamp(joint, condition, mine[0], others[0]))
+    return found
+
+
+def _ground_clamp(scene: Scene, clamps: list[_Clamp], result: SpatialPlacement) -> str | None:
+    """The joint that welds a node to the ground as the rod starts."""
+    for joint, condition, side, other in clamps:
         if condition.angle is not None:
-            turn = turns.about_z(condition.angle if mine[0] is condition.second else -np.asarray(condition.angle))
-            wanted = turns.product(result.attitudes.rotation(others[0].body), turn)
-            if np.any(np.abs(wanted - section_at(scene, result, mine[0])) > ALIGNED):
+            turn = turns.about_z(condition.angle if side is condition.second else -np.asarray(condition.angle))
+            wanted = turns.product(result.attitudes.rotation(other.body), turn)
+            if np.any(np.abs(wanted - section_at(scene, result, side)) > ALIGNED):
                 continue
         return joint
     return None

@@ -191,7 +191,7 @@ class _Start:
     def _vectors(self, vectors: Sequence[Affine], lanes: Index) -> tuple[Array, Array]:
         """Return the matrices of vectors (see `affine.matrices`), and the vectors at the start, (lanes, vectors, 3)."""
         matrix, constant = matrices(vectors, len(self.q), lanes)
-        flat = matrix.reshape(len(matrix), -1, len(self.q))
+        flat = matrix.reshape(len(matrix), 3 * len(vectors), len(self.q))
         return matrix, (flat @ self.q[:, lanes].T[..., None]).reshape(len(lanes), len(vectors), 3) + constant
 
     def _stated(self, lanes: Index) -> list[_Wish]:
