@@ -66,8 +66,9 @@ class GapWork(NamedTuple):
     (directions * unknowns, lanes). none: the acceleration without forces, unit: a unit force, (rows, lanes). reaction:
     multipliers of the constraints: without forces, by a unit force of each direction, and as they are, ((directions +
     2) * constraints, lanes). matrix, load, found, way: of one lane. pair: `pairs.describe`. log: time, contact, kind
-    and impulse of each event of the first lane, (4 * LOGGED,); number: of events, alone: whether a lane of a tile of
-    several comes near an event, which it has to meet alone, (lanes,).
+    and impulse of each event of the first lane, (4 * LOGGED,); number: of events, decisions: times at which
+    contacts were decided on, alone: whether a lane of a tile of several comes near an event, which it has to meet
+    alone, (lanes,).
     """
 
     memory: Array
@@ -97,6 +98,7 @@ class GapWork(NamedTuple):
     pair: Array
     log: Array
     number: Array
+    decisions: Array
     alone: Array
 
 
@@ -115,7 +117,7 @@ def room(width: int, g: Gaps, unknowns: int, rows: int, constraints: int) -> Gap
         "heading": 3 * each, "axes": 9 * each, "gradient": vectors, "response": vectors, "none": whole, "unit": whole,
         "reaction": reaction, "matrix": ways * ways, "load": ways, "found": ways, "way": ways, "chosen": n,
         "pair": pairs.ROOM if g.pairs.size else 0, "log": 4 * LOGGED if n else 0,
-        "number": width if n else 0, "alone": width if n else 0,
+        "number": width if n else 0, "decisions": width if n else 0, "alone": width if n else 0,
     }  # fmt: skip
     return GapWork._make([np.zeros(sizes.get(name, each)) for name in GapWork._fields])
 

@@ -43,6 +43,10 @@ def decide(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float) -> None:
     """
     g, width, size = w.gaps, len(tile), m.gaps.size
     state = np.zeros(size * width)
+    for lane in range(width):
+        g.decisions[lane] += 1.0
+        if g.decisions[lane] > MOST:
+            _end(m, w, t, width, lane, TOO_MANY + TROUBLES * _struck(size, width, lane, g.hit))
     for at in range(size * width):
         state[at] = TOUCHES if g.hit[at] == HIT or g.closed[at] != 0.0 or g.value[at] <= m.gaps.resolution else APART
         if g.hit[at] == LIFT:
@@ -269,8 +273,6 @@ def log(m: Arrays, w: Work, t: float, contact: int, width: int, lane: int, kind:
     g = w.gaps
     g.number[lane] += 1.0
     count = int(g.number[lane])
-    if count > MOST:
-        _end(m, w, t, width, lane, TOO_MANY + TROUBLES * contact)
     if lane == 0 and count <= LOGGED:
         first = 4 * (count - 1)
         g.log[first], g.log[first + 1], g.log[first + 2], g.log[first + 3] = t, contact, kind, impulse
@@ -347,18 +349,16 @@ def _asked(tile: Tile, m: Arrays, w: Work, lane: int, contact: int, state: Array
         return OPEN
     if m.gaps.rubs[contact] == 0:
         return STICK
-    fastest, square, push = _fastest(m, w, width, lane), 0.0, 0.0
-    for k in range(1, ways):
-        row = (contact * ways + k) * width + lane
-        square += g.slip[row] ** 2
+    square, push = 0.0, 0.0
+    for k in range(ways):
         push = max(push, abs(g.load[contact * ways + k]))
+        square += g.slip[(contact * ways + k) * width + lane] ** 2 if k > 0 else 0.0
     speed = np.sqrt(square)
     if g.hit[at] == SLIDE:
         response.along_heading(m, w, contact, width, lane)
         return KNOWN
-    # A slip that ends is none below what its deceleration stops within the resolution.
-    least = np.sqrt(2.0 * push * m.gaps.resolution) if g.hit[at] == STOP else 0.0
-    if speed <= max(least, STILL * fastest):
+    # A slip is none that such accelerations stop within the resolution, as a hop is.
+    if speed <= max(np.sqrt(2.0 * push * m.gaps.resolution), STILL * _fastest(m, w, width, lane)):
         return STICK
     for k in range(1, ways):
         g.way[contact * ways + k] = g.slip[(contact * ways + k) * width + lane] / speed
