@@ -25,7 +25,7 @@ import scipy.sparse
 
 from shoal.mechanics.analysis.evaluate import Evaluation, Evaluator
 from shoal.mechanics.analysis.freedom import Freedom, Metric
-from shoal.mechanics.analysis.lanczos import lowest
+from shoal.mechanics.analysis.lanczos import is_firm, lowest
 from shoal.mechanics.analysis.rest_contacts import RestContacts
 from shoal.mechanics.analysis.small_motions import ROUND, BoundedMatrix, Spectrum, parts_of, spectrum
 from shoal.mechanics.analysis.sparse_freedom import SparseFreedom, SparseMetric
@@ -186,6 +186,16 @@ class Balance:
             return found
         left = np.abs(evaluation.force - evaluation.jacobian.T @ view.multipliers) / self.size
         return BoundedMatrix(found.matrix, found.bound + OFF * scipy.sparse.diags_array(left))
+
+    def is_firm(self, q: Array, view: View, load: float = 1.0) -> bool:
+        """Return whether every displacement is pulled back by more than round-off, where the loads have a potential."""
+        stiffness = self.tangent(q, view, load)
+        if isinstance(view.freedom, SparseFreedom):
+            mass, parts = self.evaluator.mass, parts_of(self.evaluator.mass, view.evaluation.jacobian)
+            if is_firm(view.freedom, stiffness, mass, parts):
+                return True
+        found = self.spectrum_of(stiffness, view)
+        return bool(np.all(found.values > found.levels))
 
     def spectrum(self, q: Array, view: View, load: float = 1.0, least: int = LOWEST) -> Spectrum:
         """The squared frequencies of small motions, where the loads have a potential; least: see `spectrum_of`."""

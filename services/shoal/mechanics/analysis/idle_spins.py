@@ -39,6 +39,8 @@ def idle_spins(balance: Balance, placement: Placement, q: Array) -> tuple[Array,
     if scene.dimensions == plane.DIMENSIONS or not directors:
         return none, []
     view = balance.look(q, 0.0)
+    if balance.is_firm(q, view, 0.0):
+        return none, []
     found = balance.spectrum(q, view, 0.0)
     free = found.shapes[:, np.abs(found.values) <= found.levels]
     if not free.size:

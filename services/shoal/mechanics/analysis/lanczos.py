@@ -50,7 +50,7 @@ def lowest(free: SparseFreedom, stiffness: BoundedMatrix, mass: Any, parts: Inde
     """
     matrix, random = stiffness.matrix, np.random.default_rng(0)
     stiffest = _stiffest(free, matrix, mass, parts, random)
-    shift = -max(SAFE * TENSION * float(np.max(stiffest, initial=0.0)), LEAST)
+    shift = -_safe(stiffest)
     count, shifted = least, False
     while True:
         inverse = free.factored(matrix - shift * mass)
@@ -66,6 +66,23 @@ def lowest(free: SparseFreedom, stiffness: BoundedMatrix, mass: Any, parts: Inde
             shift, shifted = -float(np.min(told)), True
         else:
             return Spectrum(values, shapes, levels)
+
+
+def is_firm(free: SparseFreedom, stiffness: BoundedMatrix, mass: Any, parts: Index) -> bool:
+    """Return whether all squared frequencies are far above round-off, by one factorisation and no shapes.
+
+    Where they are not, their own round-off decides (`lowest`).
+    """
+    stiffest = _stiffest(free, stiffness.matrix, mass, parts, np.random.default_rng(0))
+    try:
+        return free.factored(stiffness.matrix - _safe(stiffest) * mass).below == 0
+    except np.linalg.LinAlgError:
+        return False
+
+
+def _safe(stiffest: Array) -> float:
+    """Return a squared frequency far above round-off [rad^2/s^2]."""
+    return max(SAFE * TENSION * float(np.max(stiffest, initial=0.0)), LEAST)
 
 
 def _stiffest(free: SparseFreedom, matrix: Any, mass: Any, parts: Index, random: np.random.Generator) -> Array:

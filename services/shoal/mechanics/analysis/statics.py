@@ -138,21 +138,27 @@ class _Search:
         for attempt in range(4):
             if not found.converged:
                 break
+            found = self._polished(found)
             eigenvalues, levels, _ = self._eigen(found.point)
             if not (leave_unstable and has_potential) or not np.any(np.real(eigenvalues) < -levels):
                 break
             met = [kinds.LEFT_UNSTABLE.found("left an unstable equilibrium")]
             found = self._descended(found.point + KICK * (1 + attempt) * self._soft(found.point)[0])
-        if found.converged:
-            refined = self._count(self.balance.newton(found.point, most=6))
-            if refined.converged and self._turn(found.point, refined.point) < 1e-3:
-                found = refined
-                self._follow(found.point)
+        else:
+            found = self._polished(found) if found.converged else found
         if found.converged:
             self.pressing = self.balance.hold(found.point)
         if not found.converged and (endless := self._endless(found)):
             return self._ending(found.point, endless)
         return self._ending(found.point, self._assess(found, met), found)
+
+    def _polished(self, found: Root[Array]) -> Root[Array]:
+        """Return an equilibrium to the digits that Newton's method has."""
+        refined = self._count(self.balance.newton(found.point, most=6))
+        if not refined.converged or self._turn(found.point, refined.point) >= 1e-3:
+            return found
+        self._follow(refined.point)
+        return refined
 
     def _nudged(self, q: Array) -> Array:
         """Return a position to descend from, perturbed to one side where both are equal, as in buckling."""
@@ -337,8 +343,7 @@ class _Search:
         """Return whether the reduced stiffness pulls every displacement back."""
         if self.evaluator.follows and load > 0:
             return True
-        found = self.balance.spectrum(q, self.balance.look(q, load), load)
-        return bool(np.all(found.values > found.levels))
+        return self.balance.is_firm(q, self.balance.look(q, load), load)
 
     def _eigen(self, q: Array) -> tuple[Array, Array, Array]:
         """Eigenvalues of the reduced stiffness (complex with loads that follow), their levels, the lowest one's shape.
