@@ -13,7 +13,7 @@ from numba import njit
 from shoal.mechanics import kernels
 from shoal.mechanics.contact.decision import HIT, LIFT, SLIDE, STOP
 from shoal.mechanics.dynamics import Work
-from shoal.mechanics.gaps import DRY, SLIP
+from shoal.mechanics.gaps import DRY, RIGID, SLIP
 from shoal.mechanics.integrators.scheme import Scheme, interpolate
 from shoal.mechanics.marched import LoopRoom
 from shoal.mechanics.model import Arrays
@@ -123,7 +123,9 @@ def first(
                     happens = happens or (g.before[MARGIN * count + at] >= 0.0 and _turns(m, w, width, at))
             else:
                 dips = g.before[RATE * count + at] < 0.0 and g.rate[at] > 0.0
-                happens = g.value[at] < -m.gaps.resolution or dips
+                # What gives way may open before the surfaces have come apart.
+                falls = m.gaps.soft[at // width] == RIGID or g.rate[at] < 0.0
+                happens = (falls and g.value[at] < -m.gaps.resolution) or dips
             g.hit[at] = 1.0 if happens else 0.0
         if _any(count, g.hit):
             found = _earliest(tile, scheme, m, w, k, t, left, right, taken, tolerance, holding)
@@ -131,7 +133,18 @@ def first(
                 return found
             _at(tile, scheme, m, w, k, t, right, taken, tolerance, holding)
         shift(tile, m, w)
-    return NEVER
+    return _met(tile, m, w, taken)
+
+
+@njit(cache=True, error_model="numpy")
+def _met(tile: Tile, m: Arrays, w: Work, taken: float) -> float:
+    """Return 1 and mark the gaps if some close just at the end of the step, from where they would go on; else NEVER."""
+    g, found = w.gaps, NEVER
+    for at in range(m.gaps.size * len(tile)):
+        closes = g.closed[at] == 0.0 and abs(g.value[at]) <= m.gaps.resolution
+        g.hit[at] = HIT if closes and -g.rate[at] * taken > m.gaps.resolution else 0.0
+        found = 1.0 if g.hit[at] == HIT else found
+    return found
 
 
 @njit(cache=True, error_model="numpy")
@@ -192,7 +205,7 @@ def _root(
     _at(tile, scheme, m, w, k, t, right, taken, tolerance, holding)
     fa = _read(m, w, width, at, what)
     if not fa * fb < 0.0:
-        return right
+        return left if left > 0.0 and fb < 0.0 else right
     part = fa / (fa - fb)
     for _ in range(ITERATIONS):
         x = a + part * (b - a)
@@ -227,15 +240,18 @@ def _at(
 
 
 @njit(cache=True, error_model="numpy")
-def miss(tile: Tile, m: Arrays, w: Work) -> float:
-    """Return the time [s] by which the end of the step misses the gaps that it was to close, the largest by size."""
+def miss(tile: Tile, m: Arrays, w: Work, taken: float) -> float:
+    """Return the time [s] by which the end of the step misses the gaps that it was to close, the largest by size.
+
+    By Newton's method; none where a gap closes so slowly that it would leave the step, of length `taken`.
+    """
     g, most = w.gaps, 0.0
     kernels.look(tile, m, w, w.z, w.zdot)
     for at in range(m.gaps.size * len(tile)):
         if g.hit[at] == HIT and g.rate[at] < 0.0 and abs(g.value[at]) > m.gaps.resolution:
             late = -g.value[at] / g.rate[at]
             most = late if abs(late) > abs(most) else most
-    return most
+    return most if abs(most) < 0.5 * taken else 0.0
 
 
 @njit(cache=True, error_model="numpy")
@@ -246,6 +262,6 @@ def touching(tile: Tile, m: Arrays, w: Work) -> float:
     for at in range(m.gaps.size * len(tile)):
         if m.gaps.kind[at // len(tile)] == DRY:
             g.hit[at], g.closed[at], found = HIT, 1.0, 1.0
-        elif g.value[at] <= TOUCHING * m.gaps.resolution and g.rate[at] <= 0.0:
+        elif g.value[at] <= TOUCHING * m.gaps.resolution and (g.rate[at] <= 0.0 or m.gaps.soft[at // len(tile)] > 0):
             g.hit[at], found = HIT, 1.0
     return found

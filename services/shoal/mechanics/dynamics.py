@@ -121,6 +121,7 @@ def loaded(m: Arrays) -> bool:
         or m.forces.size + a.fixed + a.following + a.turning + a.twisting > 0
         or m.damped
         or m.gaps.tangents > 0
+        or m.gives
     )
 
 
@@ -282,3 +283,8 @@ def energies(tile: Tile, m: Arrays, w: Work) -> None:
             function_pointers.call(m.table.energy[kind], (tile, family, w.z, w.element, w.energy, 1))
     simd.store(w.energy, 3 * width, simd.load(tile, w.energy, width))
     forces.add_energy(tile, m.forces, m.functions, w.z, w.memory, w.element, w.energy, 1)
+    if m.gives and width == 1:
+        function_pointers.call(m.table.look, (tile, m, w, w.z, w.zdot))
+        for contact in range(m.gaps.size):
+            if m.gaps.soft[contact] != gaps.RIGID and w.gaps.closed[contact] != 0.0:
+                w.energy[1] += gaps.press(m.gaps, w.gaps, contact, 1, 0)[2]

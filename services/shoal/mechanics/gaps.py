@@ -19,6 +19,10 @@ from shoal.mechanics.pairs import Pairs
 
 LIMIT, DRY, PAIR = 0, 1, 2
 """Kinds of contacts: a limit of a measure, dry friction of a given force along a measure, two surfaces."""
+RIGID, GIVES = 0, 1
+"""Whether a contact is rigid, or gives way by a law of its force."""
+STIFFNESS, EXPONENT, DAMPING, LOSS, VISCOSITY = range(5)
+LAW_SIZE = 5
 STICK, SLIP = 1.0, 2.0
 """Modes of closed contacts that rub."""
 
@@ -31,8 +35,9 @@ class Gaps(NamedTuple):
     with the limit for its natural value, or slips. sign: 1 of a lower limit and of friction, -1 of an upper limit.
     restitution, tangential: rate after an impact over the rate before, with the opposite sign (Newton), along the
     normal and of stick. mu, mu_static: coefficients of friction in slip and of the limit of stick; given: friction that
-    no normal force causes [N or N m]. The last six are (contacts, lanes). resolution: gaps below this are closed, [m or
-    rad].
+    no normal force causes [N or N m]. The last six are (contacts, lanes). soft: RIGID, or that the force along the
+    normal is that of a law, see `press`, with five numbers in law, (5 * contacts, lanes). resolution: gaps below this
+    are closed, [m or rad].
     """
 
     size: int
@@ -49,6 +54,8 @@ class Gaps(NamedTuple):
     mu: Array
     mu_static: Array
     given: Array
+    soft: Index
+    law: Array
     resolution: float
 
 
@@ -57,7 +64,8 @@ class GapWork(NamedTuple):
 
     memory: the continuous angles of angular measures. value, rate: g [m or rad] and its rate; margin: of a contact that
     slips the slip along `heading`, of one that sticks what is left to the limit of its friction. anchor:
-    where a joint sticks by dry friction [rad or m]; its value is the way from there. before: value, rate,
+    where a joint sticks by dry friction [rad or m]; its value is the way from there. speed: at which one that
+    gives way was met [m/s]. before: value, rate,
     force and margin at the beginning of a step, (4 * contacts, lanes). closed: whether the contact is closed, mode:
     whether it sticks or slips; hit: what event of it a step has ended at. force: multiplier by direction, of a closed
     contact along the normal not negative [N or N m]. slip, bias: rate of each direction, and its derivative for
@@ -76,6 +84,7 @@ class GapWork(NamedTuple):
     rate: Array
     margin: Array
     anchor: Array
+    speed: Array
     before: Array
     closed: Array
     mode: Array
@@ -190,6 +199,27 @@ def slip_along(gaps: Gaps, g: GapWork, contact: int, width: int, lane: int) -> f
             here += axis * g.slip[(contact * ways + way) * width + lane]
         total += here * g.heading[(3 * contact + k) * width + lane]
     return total
+
+
+@njit(cache=True, error_model="numpy")
+def press(gaps: Gaps, g: GapWork, contact: int, width: int, lane: int) -> tuple[float, float, float]:
+    """Return the force of a contact that gives way by d = -g, K d^n (1 + (h + x/v) d') + c d' [N].
+
+    K: STIFFNESS, n: EXPONENT, h: DAMPING, x: LOSS, c: VISCOSITY; v: the rate at which it was met (Hertz 1882, Hunt and
+    Crossley 1975). It changes its sign where the contact opens. Then its elastic part, and what that has stored [J].
+    """
+    at, first = contact * width + lane, LAW_SIZE * contact
+    depth, rate = -g.value[at], -g.rate[at]
+    stiffness = gaps.law[(first + STIFFNESS) * width + lane]
+    exponent = gaps.law[(first + EXPONENT) * width + lane]
+    elastic = stiffness * abs(depth) ** exponent
+    stored = elastic * abs(depth) / (exponent + 1.0)
+    if depth <= 0.0:
+        return -elastic, -elastic, stored
+    loss = gaps.law[(first + LOSS) * width + lane]
+    damping = gaps.law[(first + DAMPING) * width + lane] + (loss / g.speed[at] if loss > 0.0 else 0.0)
+    viscous = gaps.law[(first + VISCOSITY) * width + lane] * rate
+    return elastic * (1.0 + damping * rate) + viscous, elastic, stored
 
 
 @njit(cache=True, error_model="numpy")

@@ -377,7 +377,7 @@ def _advance(
                 if found <= 1.0:
                     again, aims = found * taken, 1
             elif aims <= AIMS:
-                again, aims = min(taken + events.miss(tile, m, w), rest), aims + 1
+                again, aims = min(taken + events.miss(tile, m, w, taken), rest), aims + 1
         if again == taken:
             if touches:
                 k.progress[EVENT] = 1.0 if aims > 0 else 0.0
@@ -401,7 +401,7 @@ def _account(
     if free:
         for x in (LOBATTO, 1.0 - LOBATTO):
             interpolate(tile, scheme, m, w, k.past, x, taken, k.q, k.v)
-            if m.driven or m.rubbing.size > 0 or m.gaps.tangents > 0:
+            if m.driven or m.rubbing.size > 0 or m.gaps.tangents > 0 or m.gives:
                 kernels.acceleration(tile, m, w, begin + x * taken, k.q, k.v, tolerance, w.stage)
             else:
                 kernels.force(tile, m, w, begin + x * taken, k.q, k.v, w.stage)

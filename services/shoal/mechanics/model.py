@@ -80,6 +80,7 @@ class Arrays(NamedTuple):
     projects: bool
     driven: bool
     damped: bool
+    gives: bool
     derived: Derived
     pattern: sparse.Pattern
     mass: Array
@@ -308,6 +309,7 @@ class Model:
             self.scene.solver.project,
             bool(np.any(self.constraints.drive >= 0)),
             any(family.damped for family in self.elements),
+            bool(np.any(self.gaps.soft)),
             packed(self.derived, lanes, tile),
             pattern,
             mass,

@@ -14,7 +14,7 @@ from shoal.mechanics.assembly.loads import ElementForceLaw, Measures
 from shoal.mechanics.derived import RowAllocator
 from shoal.mechanics.forces import DISTANCE, PLACE
 from shoal.mechanics.frames import RigidFrame
-from shoal.mechanics.gaps import DRY, LIMIT, PAIR, Gaps
+from shoal.mechanics.gaps import DRY, GIVES, LAW_SIZE, LIMIT, PAIR, RIGID, Gaps
 from shoal.mechanics.numerics.tile import Number, index, stacked
 from shoal.mechanics.pairs import FLAT, HOLE, ROUND, Pairs
 from shoal.mechanics.reach import span
@@ -41,6 +41,8 @@ class Contacts(Measures):
         self._numbers: list[tuple[Number, ...]] = []
         """Sign, restitution, tangential restitution, mu, mu_static and given friction of each contact."""
         self._rolls: list[bool] = []
+        self._laws: list[tuple[int, tuple[Number, ...]]] = []
+        """Whether a contact gives way, and the numbers of its law."""
         self._pairs: list[tuple[int, bool, list[bool], list[int], Number, Number]] = []
         """Shape, whether a disc, turning sides, rows, radius and reach of each pair of surfaces."""
         for name, joint in scene.joints.items():
@@ -73,6 +75,8 @@ class Contacts(Measures):
             self.forces(),
             pairs,
             *numbers,
+            index([soft for soft, _ in self._laws]),
+            stacked([part for _, law in self._laws for part in law]),
             RESOLUTION * float(np.max(span(self.scene))) if size else 0.0,
         )
 
@@ -82,11 +86,13 @@ class Contacts(Measures):
     def _add(
         self, field: str, kind: int, number: int, sign: float, *, restitution: Number = 0.0,
         tangential: Number = 0.0, mu: Number = 0.0, mu_static: Number = 0.0, given: Number = 0.0, rolls: bool = False,
+        law: tuple[Number, ...] | None = None,
     ) -> None:  # fmt: skip
         self.fields.append(field)
         self._each.append((kind, number))
         self._numbers.append((sign, restitution, tangential, mu, mu_static, given))
         self._rolls.append(rolls)
+        self._laws.append((RIGID, (0.0,) * LAW_SIZE) if law is None else (GIVES, law))
 
     def _limit(self, field: str, side: str, place: Number, sign: float, limit: Number, restitution: Number) -> None:
         """Limit the last measure on one side; place: where it is at the start [rad or m]."""
@@ -159,9 +165,13 @@ class Contacts(Measures):
         self._add(
             f"contacts.{name}", PAIR, len(self._pairs) - 1, 1.0, restitution=contact.restitution,
             tangential=contact.tangential_restitution, mu=contact.mu, mu_static=static, rolls=contact.rolling,
+            law=None if contact.law is None else contact.law.numbers,
         )  # fmt: skip
         flat = None if first.axis is None else axle
-        self._check(f"contacts.{name}", self._start_gap(shape, places, normal, flat, first.radius, reach), 0.0, LOWER)
+        if contact.law is None:
+            self._check(
+                f"contacts.{name}", self._start_gap(shape, places, normal, flat, first.radius, reach), 0.0, LOWER
+            )
 
     def _directors(self, side: ContactSurface) -> list[Affine]:
         """Return vectors that turn with a body; none for the ground, point masses, and rods, which touch at a point."""

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from shoal.mechanics.gaps import DRY, SLIP, STICK, Gaps
+from shoal.mechanics.gaps import DRY, RIGID, SLIP, STICK, Gaps
 from shoal.mechanics.numerics.tile import Array
 
 OPEN, KNOWN = 0.0, 3.0
@@ -85,7 +85,8 @@ def solve(n: int, matrix: Array, load: Array, out: Array) -> None:
 def hold(gaps: Gaps, width: int, lane: int, mode: Array, way: Array, matrix: Array, load: Array, out: Array) -> None:
     """Find the forces p of contacts whose modes are known: their rates G p + c vanish but for slip.
 
-    mode: by contact; way: direction of slip in the tangents, by direction; load: c.
+    mode: by contact; way: direction of slip in the tangents, by direction; load: c, of a contact that
+    gives way its force in place of that along the normal.
     """
     ways = 1 + gaps.tangents
     n = gaps.size * ways
@@ -106,6 +107,8 @@ def hold(gaps: Gaps, width: int, lane: int, mode: Array, way: Array, matrix: Arr
                 right[row] = -load[row]
             else:
                 equations[row * n + row] = 1.0
+                if k == 0 and mode[contact] != OPEN and gaps.soft[contact] != RIGID:
+                    right[row] = load[row]
     solve(n, equations, right, out)
 
 
@@ -115,7 +118,7 @@ def is_unknown(gaps: Gaps, contact: int, k: int, mode: float) -> bool:
     if mode == OPEN:
         return False
     if k == 0:
-        return gaps.kind[contact] != DRY  # type: ignore[no-any-return]
+        return gaps.kind[contact] != DRY and gaps.soft[contact] == RIGID  # type: ignore[no-any-return]
     return mode == STICK and gaps.rubs[contact] > 0 and (k == 1 or gaps.kind[contact] != DRY)  # type: ignore[no-any-return]
 
 
@@ -149,6 +152,8 @@ def decide(
                 for j in range(n):
                     if j < first or j >= first + ways:
                         rest[row] += matrix[row * n + j] * out[j]
+            if gaps.soft[contact] != RIGID:
+                rest[first] = load[first]
             found = _alone(gaps, contact, width, lane, asked[contact], mode, way, matrix, rest, out, impulsive)
             if found > outcome % TROUBLES:
                 outcome = found + TROUBLES * contact
@@ -215,6 +220,9 @@ def _alone(
             mode[contact], way[row] = SLIP, -np.sign(push)
         out[row] = -given * way[row]
         return FINE
+    if gaps.soft[contact] != RIGID:
+        _under(gaps, contact, width, lane, asked, mode, way, matrix, rest, out)
+        return FINE
     normal, own = rest[first], matrix[first * n + first]
     mode[contact] = KNOWN if asked == KNOWN else STICK
     if gaps.rubs[contact] == 0:
@@ -248,6 +256,37 @@ def _alone(
         return FINE
     mode[contact] = SLIP
     return _slip(gaps, contact, gaps.mu[at], push, matrix, rest, way, out)
+
+
+@njit(cache=True, error_model="numpy")
+def _under(
+    gaps: Gaps, contact: int, width: int, lane: int, asked: float, mode: Array, way: Array, matrix: Array, rest: Array,
+    out: Array,
+) -> None:  # fmt: skip
+    """Let a contact stick or slip under a normal force that is known."""
+    ways, at = 1 + gaps.tangents, contact * width + lane
+    n, first, normal = gaps.size * ways, contact * ways, rest[contact * ways]
+    out[first], mode[contact] = normal, KNOWN if asked == KNOWN else STICK
+    if gaps.rubs[contact] == 0:
+        return
+    if asked != KNOWN:
+        block, right, push = np.zeros(ways * ways), np.zeros(ways), np.zeros(ways)
+        block[0] = 1.0
+        for i in range(1, ways):
+            right[i] = -rest[first + i] - matrix[(first + i) * n + first] * normal
+            for j in range(1, ways):
+                block[i * ways + j] = matrix[(first + i) * n + first + j]
+        solve(ways, block, right, push)
+        size = np.sqrt(np.sum(push[1:] ** 2))
+        if size <= limit(gaps, contact, width, lane, max(normal, 0.0), True):
+            for k in range(1, ways):
+                out[first + k] = push[k]
+            return
+        mode[contact] = SLIP
+        for k in range(1, ways):
+            way[first + k] = -push[k] / size
+    for k in range(1, ways):
+        out[first + k] = -gaps.mu[at] * normal * way[first + k]
 
 
 @njit(cache=True, error_model="numpy")

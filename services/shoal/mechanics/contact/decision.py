@@ -14,13 +14,15 @@ from shoal.compile import function_pointers
 from shoal.mechanics.contact import complementarity, coulomb, motion, response
 from shoal.mechanics.contact.coulomb import FINE, KNOWN, OPEN, TROUBLES
 from shoal.mechanics.dynamics import ACCELERATION, Work
-from shoal.mechanics.gaps import DRY, LOGGED, SLIP, STICK
+from shoal.mechanics.gaps import DRY, LOGGED, RIGID, SLIP, STICK, press
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics.tile import Array, Tile
 
 HIT, LIFT, SLIDE, STOP = 1.0, -1.0, 2.0, 3.0
 """Events: a gap closes, a contact opens, one that sticks begins to slip, a slip ends."""
-KINDS = {HIT: "impact", LIFT: "opens", SLIDE: "slips", STOP: "sticks"}
+MEET = 4.0
+"""A contact that gives way is met."""
+KINDS = {HIT: "impact", MEET: "touches", LIFT: "opens", SLIDE: "slips", STOP: "sticks"}
 APART, TOUCHES, SEPARATES = 0.0, 1.0, 2.0
 """States of a contact at an event."""
 PASSES = 10_000
@@ -48,7 +50,10 @@ def decide(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float) -> None:
         if g.decisions[lane] > MOST:
             _end(m, w, t, width, lane, TOO_MANY + TROUBLES * _struck(size, width, lane, g.hit))
     for at in range(size * width):
-        state[at] = TOUCHES if g.hit[at] == HIT or g.closed[at] != 0.0 or g.value[at] <= m.gaps.resolution else APART
+        near = g.value[at] <= m.gaps.resolution and m.gaps.soft[at // width] == RIGID
+        state[at] = TOUCHES if g.hit[at] == HIT or g.closed[at] != 0.0 or near else APART
+        if g.hit[at] == HIT:
+            g.speed[at] = -g.rate[at]
         if g.hit[at] == LIFT:
             log(m, w, t, at // width, width, at % width, LIFT, 0.0)
     _strike(tile, m, w, t, tolerance, state)
@@ -62,7 +67,8 @@ def decide(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float) -> None:
                 continue
             # Round-off may leave a force or a friction beyond its limit: the event follows at once.
             force = g.force[at // width * (1 + m.gaps.tangents) * width + at % width]
-            if m.gaps.kind[at // width] != DRY and force < 0.0:
+            opens = m.gaps.soft[at // width] == RIGID or g.rate[at] > 0.0
+            if m.gaps.kind[at // width] != DRY and opens and force < 0.0:
                 g.hit[at], again = LIFT, True
             elif m.gaps.rubs[at // width] > 0 and g.mode[at] == STICK and g.margin[at] < 0.0:
                 g.hit[at], again = SLIDE, True
@@ -154,7 +160,7 @@ def _strike(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float, state: A
             at = contact * width + lane
             meets = g.hit[at] == HIT and m.gaps.kind[contact] != DRY and t > 0.0
             if meets or (closed[at] == 0.0 and impulse[at] > 0.0):
-                log(m, w, t, contact, width, lane, HIT, impulse[at])
+                log(m, w, t, contact, width, lane, HIT if m.gaps.soft[contact] == RIGID else MEET, impulse[at])
 
 
 @njit(cache=True, error_model="numpy")
@@ -202,7 +208,7 @@ def _impact(tile: Tile, m: Arrays, w: Work, t: float, lane: int, state: Array, p
         some = turn == 0
         for contact in range(size):
             at, first = contact * width + lane, contact * ways
-            member = state[at] != APART and rates[first] <= STILL * fastest
+            member = state[at] != APART and rates[first] <= STILL * fastest and m.gaps.soft[contact] == RIGID
             some = some or (member and m.gaps.kind[contact] != DRY and rates[first] < -STILL * fastest)
             g.chosen[contact] = STICK if member else OPEN
             restitution = 0.0 if plastic[at] != 0.0 else m.gaps.restitution[at]
@@ -211,7 +217,7 @@ def _impact(tile: Tile, m: Arrays, w: Work, t: float, lane: int, state: Array, p
                 g.load[first + k] = (1.0 + e) * rates[first + k] if member else 0.0
         if not some:
             break
-        if m.gaps.tangents == 0:
+        if m.gaps.tangents == 0 and not m.gives:
             complementarity.complementary(size, g.matrix, g.load, g.chosen, g.found)
         else:
             outcome = coulomb.decide(m.gaps, width, lane, g.chosen, g.way, g.matrix, g.load, g.found, True)
@@ -232,7 +238,8 @@ def _impact(tile: Tile, m: Arrays, w: Work, t: float, lane: int, state: Array, p
         first = contact * ways
         strikes = total[first] * g.matrix[first * size * ways + first] > STILL * fastest
         impulse[at] = total[first] if strikes else 0.0
-        if state[at] != APART and m.gaps.kind[contact] != DRY and rates[contact * ways] > STILL * fastest:
+        rigid = m.gaps.kind[contact] != DRY and m.gaps.soft[contact] == RIGID
+        if state[at] != APART and rigid and rates[contact * ways] > STILL * fastest:
             state[at] = SEPARATES
 
 
@@ -289,7 +296,9 @@ def _choose(tile: Tile, m: Arrays, w: Work, t: float, lane: int, state: Array) -
     response.load_by(tile, m, w, lane, state, w.a)
     for contact in range(size):
         g.chosen[contact] = _asked(tile, m, w, lane, contact, state)
-    if m.gaps.tangents == 0:
+        if m.gaps.soft[contact] != RIGID and g.chosen[contact] != OPEN:
+            g.load[contact * ways] = press(m.gaps, g, contact, width, lane)[0]
+    if m.gaps.tangents == 0 and not m.gives:
         complementarity.complementary(size, g.matrix, g.load, g.chosen, g.found)
         return FINE
     outcome = coulomb.decide(m.gaps, width, lane, g.chosen, g.way, g.matrix, g.load, g.found, False)
@@ -316,7 +325,8 @@ def _close(tile: Tile, m: Arrays, w: Work, t: float, lane: int, before: Array) -
     g, width, ways = w.gaps, len(tile), 1 + m.gaps.tangents
     for contact in range(m.gaps.size):
         at, now = contact * width + lane, g.chosen[contact]
-        closed = m.gaps.kind[contact] == DRY or (now != OPEN and g.found[contact * ways] > 0.0)
+        given = m.gaps.kind[contact] == DRY or m.gaps.soft[contact] != RIGID
+        closed = now != OPEN and (given or g.found[contact * ways] > 0.0)
         g.closed[at] = 1.0 if closed else 0.0
         if m.gaps.rubs[contact] == 0:
             continue

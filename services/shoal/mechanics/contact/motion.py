@@ -11,7 +11,7 @@ from numba import njit
 
 from shoal.mechanics.contact import complementarity, coulomb, response
 from shoal.mechanics.dynamics import Work
-from shoal.mechanics.gaps import DRY, SLIP, STICK
+from shoal.mechanics.gaps import DRY, RIGID, SLIP, STICK, press
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics.tile import Array, Tile
 
@@ -33,7 +33,9 @@ def _hold(tile: Tile, m: Arrays, w: Work, lane: int) -> None:
         at = contact * width + lane
         if g.closed[at] != 0.0:
             mode[contact] = g.mode[at] if m.gaps.rubs[contact] > 0 else STICK
-    if m.gaps.tangents == 0:
+        if mode[contact] != 0.0 and m.gaps.soft[contact] != RIGID:
+            g.load[contact * (1 + m.gaps.tangents)] = press(m.gaps, g, contact, width, lane)[0]
+    if m.gaps.tangents == 0 and not m.gives:
         complementarity.solve(size, g.matrix, g.load, mode, g.found)
     else:
         coulomb.hold(m.gaps, width, lane, mode, g.way, g.matrix, g.load, g.found)
@@ -59,16 +61,19 @@ def accelerate(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, 
                 more = g.found[direction] * g.reaction[((direction + 1) * c + k) * width + lane]
                 w.gauss.multiplier[k * width + lane] += more
         response.push(tile, m, w, lane, a)
-        if m.gaps.tangents > 0:
+        if m.gaps.tangents > 0 or m.gives:
             _rub(tile, m, w, lane)
 
 
 @njit(cache=True, error_model="numpy")
 def _rub(tile: Tile, m: Arrays, w: Work, lane: int) -> None:
-    """The power that friction takes up, and what is left to its limit where it sticks."""
+    """The power that friction and contacts that give way take up, and what is left to the limit of stick."""
     g, width, ways = w.gaps, len(tile), 1 + m.gaps.tangents
     for contact in range(m.gaps.size):
         at, first, square = contact * width + lane, contact * ways, 0.0
+        if m.gaps.soft[contact] != RIGID and g.closed[at] != 0.0:
+            elastic = press(m.gaps, g, contact, width, lane)[1]
+            w.power[lane] -= (g.found[first] - elastic) * g.rate[at]
         for k in range(1, ways):
             square += g.found[first + k] ** 2
             if g.mode[at] == SLIP:
@@ -102,7 +107,7 @@ def settle(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float) -> None:
                     if held[contact] != 0.0 and _is_held(tile, m, w, contact, lane, k, part):
                         rate = g.rate[at] if k == 0 else g.slip[(first + k) * width + lane]
                         g.load[first + k] = g.value[at] if part == 0 else rate
-            if m.gaps.tangents == 0:
+            if m.gaps.tangents == 0 and not m.gives:
                 complementarity.solve(m.gaps.size, g.matrix, g.load, held, g.found)
             else:
                 _settle_rubbing(tile, m, w, lane, held, part)
@@ -115,8 +120,10 @@ def _is_held(tile: Tile, m: Arrays, w: Work, contact: int, lane: int, k: int, pa
 
     Tangents of two surfaces have no place that could be held.
     """
+    if k == 0:
+        return m.gaps.soft[contact] == RIGID  # type: ignore[no-any-return]
     sticks = w.gaps.mode[contact * len(tile) + lane] == STICK
-    return k == 0 or (sticks and (part == 1 or m.gaps.kind[contact] == DRY))  # type: ignore[no-any-return]
+    return sticks and (part == 1 or m.gaps.kind[contact] == DRY)  # type: ignore[no-any-return]
 
 
 @njit(cache=True, error_model="numpy")
