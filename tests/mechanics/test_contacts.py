@@ -74,6 +74,18 @@ def block(mu: float, slope: float, pull: float, duration: float) -> Scene:
     return machine(POINT, contact, {"position": [0.0, 0.0]}, duration, loads=loads)
 
 
+@pytest.mark.parametrize("integrator", ["semi-implicit-euler", "leapfrog", "rk4"])
+def test_the_energy_of_fixed_steps_counts_what_friction_takes(integrator: str) -> None:
+    """A block slides to rest after v^2/(2 mu g), where all of its energy is taken up."""
+    mu, speed, step = 0.3, 2.0, 1e-3
+    floor = {"floor": {"first": {"body": "B"}, "second": FLOOR, "mu": mu}}
+    start = {"position": [0.0, 0.0], "velocity": [speed, 0.0]}
+    solver = {"duration": 1.0, "integrator": integrator, "step": step}
+    found = run(machine(POINT, floor, start, 1.0, solver=solver))
+    allowed = speed * step if integrator == "semi-implicit-euler" else 1e-12  # of first order
+    assert found.points[0, 0, 0, 0] == pytest.approx(speed**2 / (2.0 * mu * G), abs=allowed)
+
+
 def test_a_block_sticks_until_the_force_exceeds_friction() -> None:
     mu, slope, pull = 0.5, 0.4, 0.2
     found = run(block(mu, slope, pull, 6.0), 2.0, 6.0)

@@ -46,7 +46,12 @@ def step(tile: Tile, scheme: SemiImplicitEuler, m: Arrays, w: Work, t: float, h:
     width = len(tile)
     end = m.unknowns * width
     scheme.evaluations[0] += 1
-    if dynamics.loaded(m):
+    rubs = m.gaps.tangents > 0
+    if rubs:
+        kernels.acceleration(tile, m, w, t, w.z, w.zdot, scheme.rank_tolerance, w.stage)
+        for lane in range(width):
+            scheme.power[lane] = w.power[lane]
+    elif dynamics.loaded(m):
         # The force at the beginning acts on the mean rates.
         for i in range(end):
             w.before[i] = w.zdot[i] + 0.5 * h * w.a[i]
@@ -59,7 +64,11 @@ def step(tile: Tile, scheme: SemiImplicitEuler, m: Arrays, w: Work, t: float, h:
         w.z[i] += h * w.zdot[i]
     kernels.settle(tile, m, w, t + h, scheme.rank_tolerance)
     kernels.acceleration(tile, m, w, t + h, w.z, w.zdot, scheme.rank_tolerance, w.a)
-    if dynamics.loaded(m):
+    if rubs:
+        # Friction of contacts is found with the acceleration: the mean of its power at both ends.
+        for lane in range(width):
+            w.power[lane] = 0.5 * (scheme.power[lane] + w.power[lane])
+    elif dynamics.loaded(m):
         _add_drives(tile, scheme, m, w, t + h)
         for lane in range(width):
             w.power[lane] = scheme.power[lane]
