@@ -199,3 +199,10 @@ def test_a_disc_rests_on_a_line_and_in_a_hole() -> None:
 
     best = minimize_scalar(potential, bounds=(-np.pi, 0.0), method="bounded", options={"xatol": 1e-12}).x
     assert np.arctan2(place[1], place[0]) == pytest.approx(best, abs=1e-7)
+
+
+def test_contacts_that_give_way_are_refused_by_name() -> None:
+    law = {"stiffness": 1e6, "exponent": 1.5}
+    scene = _ball(line=0.0).with_values({"contacts.floor.law": law})
+    with pytest.raises(InputError, match=r"contacts\.floor\.law: equilibria and modes take rigid contacts"):
+        statics(scene)

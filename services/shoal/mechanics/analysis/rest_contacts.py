@@ -9,10 +9,11 @@ import scipy.sparse
 from numba import njit
 
 from shoal.compile.pointers import pointer, raw
+from shoal.errors import InputError
 from shoal.mechanics import forces
 from shoal.mechanics.forces import ANGLE, DISTANCE, LAW, NATURAL, PLACE, Forces
 from shoal.mechanics.functions import Functions
-from shoal.mechanics.gaps import DRY, PAIR
+from shoal.mechanics.gaps import DRY, GIVES, PAIR
 from shoal.mechanics.numerics.tile import SINGLE, Array, Index, Tile
 from shoal.mechanics.pairs import FLAT, HOLE, Pairs, pair_rows, side_rows
 
@@ -24,11 +25,14 @@ class RestContacts:
     """The gaps g(q) >= 0 of a model, in its first lane; not for threads, as it counts turns.
 
     names: of every gap. Friction is left out: that of a joint that sticks has no gap. Pairs of surfaces are distances,
-    or places along a normal, like the measures of joints.
+    or places along a normal, like the measures of joints. Raises InputError for contacts that give way.
     """
 
     def __init__(self, evaluator: Evaluator) -> None:
         model, gaps = evaluator.model, evaluator.gaps
+        if np.any(gaps.soft == GIVES):
+            name = model.gap_fields[int(np.argmax(gaps.soft == GIVES))]
+            raise InputError(f"{name}.law: equilibria and modes take rigid contacts; leave it out")
         self._evaluator, self.resolution = evaluator, gaps.resolution
         measured, of_pairs = gaps.measures, _measures(gaps.pairs)
         self._angles = measured.size
