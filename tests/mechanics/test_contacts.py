@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import shoal
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 from shoal.errors import InputError
@@ -228,6 +229,28 @@ def test_a_block_rocks_until_it_stands() -> None:
     assert events(found, "impact")[:5] == pytest.approx(expected, abs=1e-10)
     assert events(found, "impact")[-1] == pytest.approx(7.036712828396093, abs=1e-4)
     assert found.angles[0, 0, 0] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_exact_stick_of_a_joint_is_verified_without_a_run_that_smooths_it() -> None:
+    """A scene that is written with all fields is read again; its only errors are those of time."""
+    bar = {"kind": "rigid-body", "mass": 1.0, "inertia": 1 / 12, "centre_of_mass": [0.5, 0.0]}
+    pin = {"first": {"body": "ground", "point": [0.0, 0.0]}, "second": {"body": "B"}, "coulomb": 9.0, "stick": "exact"}
+    scene = {"name": "dry", "bodies": {"B": bar}, "joints": {"O": pin}, "initial": {"B": {"angle": -0.3}},
+             "markers": {"P": {"body": "B", "point": [1.0, 0.0]}}, "solver": {"duration": 1.0}}  # fmt: skip
+    found = shoal.simulate(scene, set={"joints.O.coulomb": 8.0})
+    assert found.ok, found.message
+    assert found.points[-1, 0, :, 0] == pytest.approx([np.cos(0.3), -np.sin(0.3)], abs=1e-14)
+    assert set(found.errors.estimates) == {"time"}
+    with pytest.raises(InputError, match=r"joints\.O: coulomb_speed: smooths friction"):
+        shoal.simulate(scene, set={"joints.O.coulomb_speed": 0.1})
+
+
+def test_a_step_too_long_for_a_rod_with_contacts_names_no_integrator_that_knows_none() -> None:
+    rod = {"kind": "rod", "length": 1.0, "height": 0.01, "width": 0.02, "density": 2700.0, "youngs_modulus": 7e10,
+           "element": "ancf-cable", "elements": 2}  # fmt: skip
+    floor = {"floor": {"first": {"body": "B", "point": "end"}, "second": FLOOR}}
+    with pytest.raises(InputError, match=r"beyond the stability limit .* use a smaller step$"):
+        run(machine(rod, floor, {"position": [0.0, 0.5]}, 1.0))
 
 
 def test_a_ball_in_a_circular_hole_is_a_billiard() -> None:

@@ -260,7 +260,9 @@ def of_bending(seen: Examined) -> tuple[list[Deviation] | None, str]:
 
 
 def _rubbing(scene: Scene) -> dict[str, Revolute | Slider]:
-    return {name: joint for name, joint in scene.joints.items() if isinstance(joint, Revolute | Slider) and joint.dry}
+    """Return the joints whose dry friction is smoothed."""
+    joints = {name: joint for name, joint in scene.joints.items() if isinstance(joint, Revolute | Slider)}
+    return {name: joint for name, joint in joints.items() if joint.dry and joint.stick == "smooth"}
 
 
 def _modal(scene: Scene) -> dict[str, Rod]:

@@ -95,7 +95,7 @@ class Runs:
         begin = clock.now() if begin is None else begin
         end = float(times[-1])
         if end > 0:
-            check_step(self.scene, self.choice)
+            check_step(self.scene, self.choice, self.model)
         single = self._alone and model is None
         turns = self._turns if model is None else _turns(self.scene, model)
         moved = self.model if model is None else model
@@ -294,8 +294,9 @@ class Changes(Sequence[Mapping[str, Any]]):
         return list, (self._found,)
 
 
-def check_step(scene: Scene, choice: Choice) -> None:
+def check_step(scene: Scene, choice: Choice, model: Model) -> None:
     """Raises UnstableStepError if the step is beyond the stability limit, InputError if no step is stable."""
+    implicit = "" if model.gaps.size else " or solver.integrator=generalized-alpha"  # knows no contacts
     if choice.limit == 0.0:
         raise InputError(
             f"solver.integrator: {choice.name} is stable at no step for this scene, which can vibrate; use another one "
@@ -304,7 +305,7 @@ def check_step(scene: Scene, choice: Choice) -> None:
     if scene.solver.step > choice.limit:
         raise UnstableStepError(
             f"solver.step: {scene.solver.step:g} s is beyond the stability limit {choice.limit:.3e} s of "
-            f"{choice.name} for this scene; use a smaller step or solver.integrator=generalized-alpha"
+            f"{choice.name} for this scene; use a smaller step{implicit}"
         )
 
 

@@ -111,7 +111,8 @@ class Resisted(Tie):
     @model_validator(mode="after")
     def _of_one_law(self) -> Resisted:
         if self.stick == "exact":
-            if "coulomb_speed" in self.model_fields_set:
+            # A default that is stated as well is no contradiction: scenes are written with all of their fields.
+            if np.any(self.coulomb_speed != type(self).model_fields["coulomb_speed"].default):
                 raise ValueError("coulomb_speed: smooths friction, and stick: exact does not; leave one of them out")
             if np.any(self.mu):
                 raise ValueError("mu: is smoothed; stick: exact is of a given friction, `coulomb`")

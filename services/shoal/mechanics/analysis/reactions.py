@@ -52,7 +52,7 @@ def states(scene: Scene, times: Sequence[float]) -> tuple[Evaluator, list[Motion
     model, solver = begun(Machine.of(scene).model(max(times))), scene.solver
     choice = pick(solver, model, step_limit)
     if max(times) > 0:
-        check_step(scene, choice)
+        check_step(scene, choice, model)
     evaluator, found = Evaluator(model), []
     initial = evaluator.turns
     for time in map(float, times):
