@@ -440,3 +440,17 @@ def test_a_gap_that_closes_just_at_the_end_of_a_step_is_seen(law: dict[str, Any]
     assert met == pytest.approx(1e-3, abs=1e-14)
     assert found.velocities is not None
     assert found.velocities[2, 0, 1, 0] == pytest.approx(1.0, abs=1e-9 if not step else 1e-3)
+
+
+def test_a_block_at_rest_on_two_corners_shares_its_weight_and_its_friction_alike() -> None:
+    """Their friction is not unique: each holds as its normal force lets it, and both begin to slip at once."""
+    b, h = 0.3, 0.1
+    body = {"kind": "rigid-body", "mass": 1.0, "inertia": (b * b + h * h) / 3}
+    corners = {name: {"first": {"body": "B", "point": [x, -h]}, "second": FLOOR, "mu": 0.5}
+               for name, x in (("left", -b), ("right", b))}  # fmt: skip
+    loads = {"pull": {"kind": "force", "at": {"body": "B", "point": [0.0, -h]}, "force": [1.0, 0.0],
+                      "scale": {"table": [[0.0, 0.0], [10.0, 10.0]]}}}  # fmt: skip
+    found = run(machine(body, corners, {"position": [0.0, h]}, 6.0, loads=loads), 4.9, 6.0)
+    assert events(found, "slips") == pytest.approx([0.5 * G, 0.5 * G], abs=1e-9)
+    assert found.points[0, 0, 0, 0] == pytest.approx(0.0, abs=1e-14)
+    assert found.points[1, 0, 0, 0] == pytest.approx((6.0 - 0.5 * G) ** 3 / 6.0, abs=1e-9)

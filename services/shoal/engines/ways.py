@@ -83,7 +83,7 @@ def _fallbacks(scene: Scene, first: Trajectory) -> Iterator[dict[str, Any]]:
     """Settings of the solver to try where the first choice of `auto` failed."""
     name, model, duration = first.model["integrator"], first.model, float(first.times[-1])
     if model["elements"] == 0:
-        if name != "radau5" and first.status[0] is not Status.FAILED:
+        if name != "radau5" and first.status[0] is not Status.FAILED and "events" not in model:
             yield {"integrator": "radau5"}
         return
     if seconds(model, "generalized-alpha", duration / scene.solver.step) < MOST:

@@ -68,15 +68,15 @@ class GapWork(NamedTuple):
     gives way was met [m/s]. before: value, rate,
     force and margin at the beginning of a step, (4 * contacts, lanes). closed: whether the contact is closed, mode:
     whether it sticks or slips; hit: what event of it a step has ended at. force: multiplier by direction, of a closed
-    contact along the normal not negative [N or N m]. slip, bias: rate of each direction, and its derivative for
-    accelerations of zero. heading: direction of slip in the axes of the ground, (3 * contacts, lanes); axes: normal and
-    tangents, (9 * contacts, lanes). gradient, response: of each direction, and the acceleration by a unit force,
-    (directions * unknowns, lanes). none: the acceleration without forces, unit: a unit force, (rows, lanes). reaction:
-    multipliers of the constraints: without forces, by a unit force of each direction, and as they are, ((directions +
-    2) * constraints, lanes). matrix, load, found, way: of one lane. pair: `pairs.describe`. log: time, contact, kind
-    and impulse of each event of the first lane, (4 * LOGGED,); number: of events, decisions: times at which
-    contacts were decided on, alone: whether a lane of a tile of several comes near an event, which it has to meet
-    alone, (lanes,).
+    contact along the normal not negative [N or N m]; near: those of the last decision. slip, bias: rate of each
+    direction, and its derivative for accelerations of zero. heading: direction of slip in the axes of the ground, (3 *
+    contacts, lanes); axes: normal and tangents, (9 * contacts, lanes). gradient, response: of each direction, and the
+    acceleration by a unit force, (directions * unknowns, lanes). none: the acceleration without forces, unit: a unit
+    force, (rows, lanes). reaction: multipliers of the constraints: without forces, by a unit force of each direction,
+    and as they are, ((directions + 2) * constraints, lanes). matrix, load, found, way, chosen: of one lane. pair:
+    `pairs.describe`. log: time, contact, kind and impulse of each event of the first lane, (4 * LOGGED,); number: of
+    events, decisions: times at which contacts were decided on, alone: whether a lane of a tile of several comes near an
+    event, which it has to meet alone, (lanes,).
     """
 
     memory: Array
@@ -90,6 +90,7 @@ class GapWork(NamedTuple):
     mode: Array
     hit: Array
     force: Array
+    near: Array
     slip: Array
     bias: Array
     heading: Array
@@ -122,7 +123,8 @@ def room(width: int, g: Gaps, unknowns: int, rows: int, constraints: int) -> Gap
     each, whole, reaction = n * width, rows * width if n else 0, (ways + 2) * constraints * width if n else 0
     vectors, by_way = ways * unknowns * width, ways * width
     sizes = {
-        "memory": g.measures.size * width, "before": 4 * each, "force": by_way, "slip": by_way, "bias": by_way,
+        "memory": g.measures.size * width, "before": 4 * each, "force": by_way, "near": by_way, "slip": by_way,
+        "bias": by_way,
         "heading": 3 * each, "axes": 9 * each, "gradient": vectors, "response": vectors, "none": whole, "unit": whole,
         "reaction": reaction, "matrix": ways * ways, "load": ways, "found": ways, "way": ways, "chosen": n,
         "pair": pairs.ROOM if g.pairs.size else 0, "log": 4 * LOGGED if n else 0,

@@ -31,10 +31,10 @@ ANGLES = 32
 
 
 @njit(cache=True, error_model="numpy")
-def solve(n: int, matrix: Array, load: Array, out: Array) -> None:
-    """Solve A x = load of consistent equations, with x = 0 where they leave it open; (n, n) in rows. Destroys both.
+def solve(n: int, matrix: Array, load: Array, out: Array) -> int:
+    """Solve A x = load of consistent equations, with x = 0 where they leave it open; (n, n) in rows. Returns the rank.
 
-    Gauss's elimination with complete pivoting of the rows and columns scaled to 1.
+    Destroys both. Gauss's elimination with complete pivoting of the rows and columns scaled to 1.
     """
     scale, order, rank = np.ones(n), np.arange(n), 0
     for turn in range(2):
@@ -79,18 +79,66 @@ def solve(n: int, matrix: Array, load: Array, out: Array) -> None:
         out[order[k]] = total / matrix[k * n + k]
     for i in range(n):
         out[i] *= scale[i]
+    return rank
 
 
 @njit(cache=True, error_model="numpy")
-def hold(gaps: Gaps, width: int, lane: int, mode: Array, way: Array, matrix: Array, load: Array, out: Array) -> None:
+def hold(
+    gaps: Gaps, width: int, lane: int, mode: Array, way: Array, matrix: Array, load: Array, near: Array, out: Array
+) -> None:
     """Find the forces p of contacts whose modes are known: their rates G p + c vanish but for slip.
 
-    mode: by contact; way: direction of slip in the tangents, by direction; load: c, of a contact that
-    gives way its force in place of that along the normal.
+    mode: by contact; way: direction of slip in the tangents, by direction; load: c, of a contact that gives way its
+    force in place of that along the normal. near: forces of the same contacts, by direction and lane: where contacts
+    depend on each other p is not unique, and of all the least in the sum of its squares, each over the normal force or
+    the limit of friction there, so that no contact is at its limit while others are not.
     """
     ways = 1 + gaps.tangents
     n = gaps.size * ways
     equations, right = np.zeros(n * n), np.zeros(n)
+    _state(gaps, width, lane, mode, way, matrix, load, equations, right)
+    if solve(n, equations, right, out) == n:
+        return
+    rest, scale, square, multiplier = np.zeros(n), np.zeros(n), np.zeros(n * n), np.zeros(n)
+    for contact in range(gaps.size):
+        first = contact * ways
+        normal = abs(near[first * width + lane])
+        scale[first] = normal if mode[contact] != OPEN else 1.0
+        for k in range(1, ways):
+            most = limit(gaps, contact, width, lane, normal, True)
+            scale[first + k] = most if most < np.inf else normal
+    _state(gaps, width, lane, mode, way, matrix, load, equations, right)
+    for i in range(n):
+        rest[i] = right[i]
+        for j in range(n):
+            for k in range(n):
+                square[i * n + j] += equations[i * n + k] * scale[k] ** 2 * equations[j * n + k]
+    solve(n, square, rest, multiplier)
+    for k in range(n):
+        out[k] = 0.0
+        for i in range(n):
+            out[k] += scale[k] ** 2 * equations[i * n + k] * multiplier[i]
+    # The equations are squared: what that leaves of them is taken out.
+    for i in range(n):
+        for j in range(n):
+            right[i] -= equations[i * n + j] * out[j]
+    solve(n, equations, right, rest)
+    for i in range(n):
+        out[i] += rest[i]
+
+
+@njit(cache=True, error_model="numpy")
+def _state(
+    gaps: Gaps, width: int, lane: int, mode: Array, way: Array, matrix: Array, load: Array, equations: Array,
+    right: Array,
+) -> None:  # fmt: skip
+    """State the equations of contacts whose modes are known."""
+    ways = 1 + gaps.tangents
+    n = gaps.size * ways
+    for i in range(n):
+        right[i] = 0.0
+        for j in range(n):
+            equations[i * n + j] = 0.0
     for contact in range(gaps.size):
         first, at = contact * ways, contact * width + lane
         slips = mode[contact] == SLIP or mode[contact] == KNOWN
@@ -109,7 +157,6 @@ def hold(gaps: Gaps, width: int, lane: int, mode: Array, way: Array, matrix: Arr
                 equations[row * n + row] = 1.0
                 if k == 0 and mode[contact] != OPEN and gaps.soft[contact] != RIGID:
                     right[row] = load[row]
-    solve(n, equations, right, out)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -163,12 +210,26 @@ def decide(
             break
     if outcome != FINE:
         return outcome
-    if change > 0.0:
-        hold(gaps, width, lane, mode, way, matrix, load, begun)
-        if _agrees(gaps, width, lane, mode, begun):
-            for i in range(n):
-                out[i] = begun[i]
-            return FINE
+    # What holds still sticks, though its friction be at its limit, as another contact holds it.
+    for contact in range(gaps.size):
+        if mode[contact] == SLIP:
+            along, size = 0.0, 0.0
+            for row in range(contact * ways + 1, contact * ways + ways):
+                rate, size = load[row], size + abs(load[row])
+                for j in range(n):
+                    rate += matrix[row * n + j] * out[j]
+                    size += abs(matrix[row * n + j] * out[j])
+                along += rate * way[row]
+            if abs(along) <= DEPENDENT * size:
+                mode[contact] = STICK
+    near = np.zeros(n * width)
+    for i in range(n):
+        near[i * width + lane] = out[i]
+    hold(gaps, width, lane, mode, way, matrix, load, near, begun)
+    if _agrees(gaps, width, lane, mode, begun):
+        for i in range(n):
+            out[i] = begun[i]
+        return FINE
     return FINE if change <= 1e-9 * largest else UNDECIDED
 
 

@@ -33,6 +33,8 @@ STILL = 1e-12
 """Rate of a contact, over the largest of a coordinate, that is round-off."""
 TOO_MANY, GAINS = 4, 5
 """Troubles beside the outcomes of `coulomb.decide`: more than `MOST` events; an impact that gains energy."""
+MARGIN = 1e-9
+"""Part of an acceleration, or of the limit of friction, that is round-off of the location of an event."""
 GAIN = 1e-9
 """Energy gained by an impact, over the work of its impulses, that is round-off."""
 
@@ -49,6 +51,8 @@ def decide(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float) -> None:
         g.decisions[lane] += 1.0
         if g.decisions[lane] > MOST:
             _end(m, w, t, width, lane, TOO_MANY + TROUBLES * _struck(size, width, lane, g.hit))
+    # The forces just before the event, which its search has left at other times.
+    function_pointers.call(m.table.motion, (tile, m, w, t, w.z, w.zdot, tolerance, w.a, ACCELERATION))
     for at in range(size * width):
         near = g.value[at] <= m.gaps.resolution and m.gaps.soft[at // width] == RIGID
         state[at] = TOUCHES if g.hit[at] == HIT or g.closed[at] != 0.0 or near else APART
@@ -168,6 +172,8 @@ def _resolve(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float, state: 
     """Decide which contacts that touch are closed from here on, and find the acceleration."""
     g, width, size = w.gaps, len(tile), m.gaps.size
     before = np.zeros(size * width)
+    for lane in range(width):
+        _slide_together(m, w, width, lane)
     for at in range(size * width):
         before[at] = g.mode[at]
         if g.hit[at] == LIFT or state[at] == SEPARATES:
@@ -185,6 +191,21 @@ def _resolve(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float, state: 
         g.force[at] = 0.0
     motion.settle(tile, m, w, t, tolerance)
     function_pointers.call(m.table.motion, (tile, m, w, t, w.z, w.zdot, tolerance, w.a, ACCELERATION))
+
+
+@njit(cache=True, error_model="numpy")
+def _slide_together(m: Arrays, w: Work, width: int, lane: int) -> None:
+    """Where a contact begins to slip, let others begin whose friction is at its limit as well, but for round-off."""
+    g, ways, some = w.gaps, 1 + m.gaps.tangents, False
+    for contact in range(m.gaps.size):
+        some = some or g.hit[contact * width + lane] == SLIDE
+    for contact in range(m.gaps.size):
+        at, square = contact * width + lane, 0.0
+        for k in range(1, ways):
+            square += g.force[(contact * ways + k) * width + lane] ** 2
+        sticks = some and g.closed[at] != 0.0 and m.gaps.rubs[contact] > 0 and g.mode[at] == STICK
+        if sticks and g.hit[at] == 0.0 and square > 0.0 and g.margin[at] <= MARGIN * np.sqrt(square):
+            g.hit[at] = SLIDE
 
 
 @njit(cache=True, error_model="numpy")
@@ -302,27 +323,60 @@ def _choose(tile: Tile, m: Arrays, w: Work, t: float, lane: int, state: Array) -
         complementarity.complementary(size, g.matrix, g.load, g.chosen, g.found)
         return FINE
     outcome = coulomb.decide(m.gaps, width, lane, g.chosen, g.way, g.matrix, g.load, g.found, False)
-    # A contact whose friction has reached its limit slips on as it pushes, unless that leads back at once.
-    returns = False
-    for contact in range(size):
+    if _leads_on(tile, m, w, lane):
+        return outcome  # type: ignore[no-any-return]
+    # One whose friction has reached its limit may stick on if others take more of what they hold together.
+    if _ask_again(tile, m, w, lane, state, STICK) == FINE and _has_room(tile, m, w, lane):
+        return FINE
+    return _ask_again(tile, m, w, lane, state, KNOWN)
+
+
+@njit(cache=True, error_model="numpy")
+def _ask_again(tile: Tile, m: Arrays, w: Work, lane: int, state: Array, slides: float) -> int:
+    """Decide again, with what is asked about contacts that have begun to slip."""
+    g, width = w.gaps, len(tile)
+    for contact in range(m.gaps.size):
+        g.chosen[contact] = _asked(tile, m, w, lane, contact, state)
         if g.hit[contact * width + lane] == SLIDE and g.chosen[contact] == KNOWN:
-            along = 0.0
+            g.chosen[contact] = slides
+    return coulomb.decide(m.gaps, width, lane, g.chosen, g.way, g.matrix, g.load, g.found, False)  # type: ignore[no-any-return]
+
+
+@njit(cache=True, error_model="numpy")
+def _leads_on(tile: Tile, m: Arrays, w: Work, lane: int) -> bool:
+    """Return whether the accelerations lead each contact that has begun to slip on in the way it slips."""
+    g, width, ways, leads = w.gaps, len(tile), 1 + m.gaps.tangents, True
+    for contact in range(m.gaps.size):
+        if g.hit[contact * width + lane] == SLIDE and g.chosen[contact] == KNOWN:
+            along, size = 0.0, 0.0
             for row in range(contact * ways + 1, contact * ways + ways):
-                along += g.way[row] * (g.load[row] + response.after(tile, m, w, row))
-            returns = returns or along < 0.0
-    if returns:
-        for contact in range(size):
-            asked = _asked(tile, m, w, lane, contact, state)
-            slides = asked == KNOWN and g.hit[contact * width + lane] == SLIDE
-            g.chosen[contact] = STICK if slides else asked
-        outcome = coulomb.decide(m.gaps, width, lane, g.chosen, g.way, g.matrix, g.load, g.found, False)
-    return outcome  # type: ignore[no-any-return]
+                change = response.after(tile, m, w, row)
+                along += g.way[row] * (g.load[row] + change)
+                size += abs(g.load[row]) + abs(change)
+            leads = leads and along > MARGIN * size
+    return leads
+
+
+@njit(cache=True, error_model="numpy")
+def _has_room(tile: Tile, m: Arrays, w: Work, lane: int) -> bool:
+    """Return whether each contact that has begun to slip sticks, with its friction below its limit again."""
+    g, width, ways, room = w.gaps, len(tile), 1 + m.gaps.tangents, True
+    for contact in range(m.gaps.size):
+        if g.hit[contact * width + lane] == SLIDE:
+            square, first = 0.0, contact * ways
+            for row in range(first + 1, first + ways):
+                square += g.found[row] ** 2
+            limit = coulomb.limit(m.gaps, contact, width, lane, g.found[first], True)
+            room = room and g.chosen[contact] == STICK and np.sqrt(square) < (1.0 - MARGIN) * limit
+    return room
 
 
 @njit(cache=True, error_model="numpy")
 def _close(tile: Tile, m: Arrays, w: Work, t: float, lane: int, before: Array) -> None:
     """Close the contacts of a lane that press, and keep what those that rub do from here on."""
     g, width, ways = w.gaps, len(tile), 1 + m.gaps.tangents
+    for direction in range(m.gaps.size * ways):
+        g.near[direction * width + lane] = g.found[direction]
     for contact in range(m.gaps.size):
         at, now = contact * width + lane, g.chosen[contact]
         given = m.gaps.kind[contact] == DRY or m.gaps.soft[contact] != RIGID

@@ -38,7 +38,7 @@ def _hold(tile: Tile, m: Arrays, w: Work, lane: int) -> None:
     if m.gaps.tangents == 0 and not m.gives:
         complementarity.solve(size, g.matrix, g.load, mode, g.found)
     else:
-        coulomb.hold(m.gaps, width, lane, mode, g.way, g.matrix, g.load, g.found)
+        coulomb.hold(m.gaps, width, lane, mode, g.way, g.matrix, g.load, g.near, g.found)
 
 
 @njit(cache=True, error_model="numpy")
