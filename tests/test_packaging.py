@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from numba import config
 from shoal import home
 from shoal.cli import main
 from shoal.errors import InputError
@@ -160,6 +161,7 @@ def test_temporary_folder_that_others_can_fill_is_not_trusted(tmp_path: Path, mo
 def test_the_choice_of_the_user_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SHOAL_HOME", str(tmp_path))
     monkeypatch.setenv("NUMBA_CACHE_DIR", "elsewhere")
+    monkeypatch.setattr(config, "CACHE_DIR", config.CACHE_DIR)  # which it sets, too
     home.prepare_kernel_cache()
     assert os.environ["NUMBA_CACHE_DIR"] == "elsewhere"
     monkeypatch.delenv("NUMBA_CACHE_DIR")

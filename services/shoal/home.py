@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+import sys
 import tempfile
 from pathlib import Path
 from typing import Literal
@@ -99,9 +100,11 @@ def compiled() -> bool:
 
 
 def prepare_kernel_cache() -> None:
-    """Point Numba at `kernel_cache()` unless the user chose a folder. Call before importing Numba."""
+    """Point Numba at `kernel_cache()` unless the user chose a folder. Call before importing kernels."""
     if not os.environ.get("NUMBA_CACHE_DIR"):
         os.environ["NUMBA_CACHE_DIR"] = str(kernel_cache())
+    if "numba" in sys.modules:  # which has read its settings
+        sys.modules["numba"].config.reload_config()
 
 
 def processor() -> str:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from numba import config
 from numba.core.dispatcher import Dispatcher
 from numba.extending import _Intrinsic
 from shoal.compile import content
@@ -237,3 +238,8 @@ text = " ".join(map(content._text, kernel.kinds))
 kinds = {{kind for pairs in content.ALTERNATIVES.values() for kind, _ in pairs if kind.__name__ in text}}
 print(len(parts), len(parts - followed(kernel.function.py_func, frozenset(kinds))))
 """
+
+
+def test_tests_find_the_kernels_that_are_compiled_ahead() -> None:
+    """Though pytest has imported Numba before; else each run would compile them into the folders of the sources."""
+    assert os.environ["NUMBA_CACHE_DIR"] == config.CACHE_DIR
