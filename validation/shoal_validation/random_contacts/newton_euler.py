@@ -21,6 +21,9 @@ SIGN = {FORTH: 1.0, BACK: -1.0}
 TOUCH, FINE, STEP, SAMPLES = 1e-11, 1e-9, 2e-3, 6
 """Gap that is closed [m]; violation of a law that is none; largest step [s]; looks at each."""
 
+MOST = 200
+"""Events after which a machine is not judged: at its limit friction may stick and slip ever again."""
+
 
 class UndecidedError(ArithmeticError):
     """No combination of modes obeys the laws, or several do."""
@@ -46,6 +49,7 @@ class NewtonEuler:
         self.contacts = list(scene["contacts"].items())
         self.closed: dict[int, int] = {}
         self.events: list[tuple[float, str]] = []
+        self.decisions = 0
 
     # Kinematics: a place is a body and its coordinates; vectors may be complex, for derivatives along a motion.
 
@@ -191,6 +195,9 @@ class NewtonEuler:
 
     def _decide(self, t: float, hits: set[int], stops: set[int], slides: Mapping[int, int]) -> None:
         """Impacts, then modes. hits: contacts that close; stops: whose slip ends; slides: the ways that others slip."""
+        self.decisions += 1
+        if self.decisions > MOST:
+            raise UndecidedError(f"more than {MOST} events")
         touching = sorted(set(self.closed) | hits)
         q, v = self.q, self.v
         pins, rows, pin_bias, bias = self._known(q, v, touching)
