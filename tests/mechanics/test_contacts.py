@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 from shoal.errors import InputError
 from shoal.mechanics.simulate import simulate
-from shoal.scene import Scene
+from shoal.scene import Scene, load_scene
 from shoal.trajectory import Trajectory
 
 pytestmark = pytest.mark.compiles("kernels of contacts, which few machines need")
@@ -131,6 +131,24 @@ def test_static_friction_above_that_of_slip_gives_stick_slip_on_a_belt() -> None
 
 
 DISC = {"kind": "rigid-body", "mass": 1.0, "inertia": 0.005}
+
+
+def test_the_built_in_disc_rolls_strikes_a_wall_and_rolls_back() -> None:
+    """Slip ends after (u - w r) / (3 mu g), at two thirds of the rate and a third of the spin: solid disc."""
+    scene, mu, kept, radius, begun = load_scene("rolling-disc"), 0.2, 0.8, 0.1, 3.0
+    slip = begun / (3.0 * mu * G)
+    rolled, rate = begun * slip - 0.5 * mu * G * slip**2, 2.0 / 3.0 * begun
+    wall = slip + (3.0 - rolled) / rate
+    again = (1.0 + kept) * rate / (3.0 * mu * G)
+    back = 3.0 - kept * rate * again + 0.5 * mu * G * again**2
+    rest, spun = 3.0 - wall - again, rate / radius * again - mu * G * again**2 / radius  # inertia m r^2 / 2
+    end = rate * (1.0 - 2.0 * kept) / 3.0
+    found = run(scene, 1.0, 3.0)
+    assert found.points[:, 0, 0, 0] == pytest.approx([rolled + rate * (1.0 - slip), back + end * rest], abs=1e-10)
+    turned = mu * G * slip**2 / radius + (3.0 - rolled) / radius + spun + end / radius * rest
+    assert found.angles[-1, 0, 0] == pytest.approx(-turned, abs=1e-8)
+    assert events(found, "impact") == pytest.approx([wall], abs=1e-10)
+    assert [one.value for one in scene.expect.values()] == pytest.approx(found.points[:, 0, 0, 0], abs=1e-10)
 
 
 def test_a_disc_slips_until_it_rolls() -> None:
