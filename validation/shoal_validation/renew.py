@@ -69,7 +69,6 @@ STUDIES: dict[str, Study] = {
     "random-directors": Study("random_space --kind directors --seeds 0:60", ("validation.md",), counts=True),
     "random-bent": Study("random_space --kind bent --seeds 0:20 --tolerance 1e-3", ("validation.md",), counts=True),
     "random-frames": Study("random_space --kind frames --seeds 0:24 --tolerance 1e-3", ("validation.md",), counts=True),
-    "random-contacts": Study("random_contacts --seeds 0:200", ("validation.md",), counts=True),
 }
 """By name, in the order in which they run."""
 

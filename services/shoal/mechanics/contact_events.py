@@ -130,10 +130,10 @@ def first(
         if _any(count, g.hit):
             found = _earliest(tile, scheme, m, w, k, t, left, right, taken, tolerance, holding)
             if found <= 1.0:
-                return found
+                return found  # type: ignore[no-any-return]
             _at(tile, scheme, m, w, k, t, right, taken, tolerance, holding)
         shift(tile, m, w)
-    return _met(tile, m, w, taken)
+    return _met(tile, m, w, taken)  # type: ignore[no-any-return]
 
 
 @njit(cache=True, error_model="numpy")
@@ -215,7 +215,7 @@ def _root(
             c, fc, b, fb = b, fb, a, fa
         a, fa = x, f
         if fa == 0.0:
-            return a
+            return a  # type: ignore[no-any-return]
         least = FRACTION / abs(b - a)
         if least > 0.5:
             break

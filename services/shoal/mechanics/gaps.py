@@ -259,7 +259,7 @@ def _bias(tile: Tile, measures: Forces, number: int, lane: int, z: Array, zdot: 
             square = z[x] * z[x] + z[y] * z[y]
             along, across = z[x] * zdot[x] + z[y] * zdot[y], z[x] * zdot[y] - z[y] * zdot[x]
             total += (1.0 if end == 0 else -1.0) * 2.0 * along * across / (square * square)
-        return total  # type: ignore[no-any-return]
+        return total
     # Products of vectors and of their rates, by component.
     rr, ru, uu, dd, de, ee, rd, turning, ue = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     x, y, xr, yr, xb, yb = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0

@@ -53,7 +53,7 @@ def side_rows(d: int) -> int:
 @njit(cache=True, forceinline=True)
 def pair_rows(d: int) -> int:
     """Rows of one pair."""
-    return 2 * side_rows(d) + 2 * d
+    return 2 * side_rows(d) + 2 * d  # type: ignore[no-any-return]
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)

@@ -81,7 +81,7 @@ def _chain(random: Any) -> Data:
     place, before = np.zeros(2), {"body": "ground", "point": [0.0, 0.0]}
     length = float(random.uniform(0.3, 0.6))
     contacts: Data = {}
-    floor = {"body": "ground", "point": [0.0, -0.75 * count * length], "line": float(random.uniform(-0.2, 0.2))}
+    floor: Data = {"body": "ground", "point": [0.0, -0.75 * count * length], "line": float(random.uniform(-0.2, 0.2))}
     law = _law(random)
     for k in range(count):
         mass, angle = float(random.uniform(0.5, 2.0)), float(random.uniform(-1.2, 0.3))

@@ -159,7 +159,7 @@ class NewtonEuler:
         self, numbers: Sequence[int], slips: Sequence[float], matrix: Array, load: Array
     ) -> Iterator[tuple[tuple[int, ...], Array]]:
         """Yield modes and forces that obey the laws. slips: known slip rates; 0 of one that is to be decided."""
-        choices = []
+        choices: list[tuple[int, ...]] = []
         for number, slip in zip(numbers, slips, strict=True):
             if not self.contacts[number][1].get("mu", 0.0):
                 choices.append((OPEN, FORTH))
@@ -265,7 +265,7 @@ class NewtonEuler:
                 found["hit", number] = float(self.surfaces(number, q)[0]) + TOUCH
         return found
 
-    def run(self, times: Sequence[float], most: int) -> Array:
+    def run(self, times: Array, most: int) -> Array:
         """Return coordinates at times [s], (times, bodies, 3), until so many impacts have been: later ones are nan."""
         t, out = 0.0, np.full((len(times), len(self.names), 3), np.nan)
         n = len(self.q)

@@ -52,10 +52,10 @@ def judged(seed: int) -> Judged:
         float(np.max(np.abs(run.marker(name)[known] - places[known, k, :2]), initial=0.0))
         for k, name in enumerate(machine.names)
     )
-    error = run.model["verification"]["time_error"]
-    if error is None:
+    known_error = run.model["verification"]["time_error"]
+    if known_error is None:
         return Judged(seed, "not judged", f"{kind}: the error is not estimated")
-    allowed = 3.0 * error + KNOWN
+    allowed = 3.0 * known_error + KNOWN
     verdict = "right" if away <= allowed else WRONG
     told = f"{away:.1e} m away, allowed {allowed:.1e} m, {len(machine.events)} impacts, {known.sum()} samples"
     return Judged(seed, verdict, f"{kind}: {told}")

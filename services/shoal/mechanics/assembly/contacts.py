@@ -64,7 +64,8 @@ class Contacts(Measures):
             self.scene.dimensions, len(self._pairs), index(shapes), index(discs),
             index(turns).ravel(), index(rows).ravel(), stacked(radii), stacked(reaches),
         )  # fmt: skip
-        numbers = [stacked(part) for part in zip(*self._numbers, strict=True)] if size else [stacked(())] * 6
+        numbers = tuple(zip(*self._numbers, strict=True)) if size else ((),) * 6
+        sign, restitution, tangential, mu, mu_static, given = (stacked(part) for part in numbers)
         return Gaps(
             size,
             self.scene.dimensions - 1 if any(rubs) else 0,
@@ -74,7 +75,12 @@ class Contacts(Measures):
             index(self._rolls),
             self.forces(),
             pairs,
-            *numbers,
+            sign,
+            restitution,
+            tangential,
+            mu,
+            mu_static,
+            given,
             index([soft for soft, _ in self._laws]),
             stacked([part for _, law in self._laws for part in law]),
             RESOLUTION * float(np.max(span(self.scene))) if size else 0.0,
@@ -150,7 +156,8 @@ class Contacts(Measures):
         shape = {"hole": HOLE, "round": ROUND}.get(second.shape, FLAT)
         normal = places[0]
         if shape == FLAT:
-            normal = self.placement.line(second, second.line + math.pi / 2 if second.plane is None else second.plane)
+            direction = second.plane if second.line is None else second.line + math.pi / 2
+            normal = self.placement.line(second, direction)
         axle = normal if first.axis is None else self.placement.line(first, first.axis)
         rows, turns = [], []
         for side, place in zip((first, second), places, strict=True):

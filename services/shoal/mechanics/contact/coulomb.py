@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 
 from shoal.mechanics.gaps import DRY, RIGID, SLIP, STICK, Gaps
-from shoal.mechanics.numerics.tile import Array
+from shoal.mechanics.numerics.tile import Array, Index
 
 OPEN, KNOWN = 0.0, 3.0
 """Modes beside STICK and SLIP: open, and slip whose direction is known before."""
@@ -93,70 +93,70 @@ def hold(
     depend on each other p is not unique, and of all the least in the sum of its squares, each over the normal force or
     the limit of friction there, so that no contact is at its limit while others are not.
     """
-    ways = 1 + gaps.tangents
-    n = gaps.size * ways
-    equations, right = np.zeros(n * n), np.zeros(n)
-    _state(gaps, width, lane, mode, way, matrix, load, equations, right)
-    if solve(n, equations, right, out) == n:
-        return
-    rest, scale, square, multiplier = np.zeros(n), np.zeros(n), np.zeros(n * n), np.zeros(n)
-    for contact in range(gaps.size):
-        first = contact * ways
-        normal = abs(near[first * width + lane])
-        scale[first] = normal if mode[contact] != OPEN else 1.0
-        for k in range(1, ways):
-            most = limit(gaps, contact, width, lane, normal, True)
-            scale[first + k] = most if most < np.inf else normal
-    _state(gaps, width, lane, mode, way, matrix, load, equations, right)
-    for i in range(n):
-        rest[i] = right[i]
-        for j in range(n):
-            for k in range(n):
-                square[i * n + j] += equations[i * n + k] * scale[k] ** 2 * equations[j * n + k]
-    solve(n, square, rest, multiplier)
-    for k in range(n):
-        out[k] = 0.0
+    ways, n = 1 + gaps.tangents, 0
+    each = np.zeros(gaps.size * ways, np.int64)
+    for row in range(gaps.size * ways):
+        out[row] = 0.0
+        if mode[row // ways] != OPEN:
+            each[n], n = row, n + 1
+    equations, right, found = np.zeros(n * n), np.zeros(n), np.zeros(n)
+    _state(gaps, width, lane, mode, way, matrix, load, n, each, equations, right)
+    if solve(n, equations, right, found) < n:
+        scale, square, rest, multiplier = np.zeros(n), np.zeros(n * n), np.zeros(n), np.zeros(n)
         for i in range(n):
-            out[k] += scale[k] ** 2 * equations[i * n + k] * multiplier[i]
-    # The equations are squared: what that leaves of them is taken out.
+            contact, k = each[i] // ways, each[i] % ways
+            normal = abs(near[contact * ways * width + lane])
+            most = limit(gaps, contact, width, lane, normal, True) if k > 0 else normal
+            scale[i] = most if most < np.inf else normal
+        _state(gaps, width, lane, mode, way, matrix, load, n, each, equations, right)
+        for i in range(n):
+            rest[i] = right[i]
+            for j in range(n):
+                for k in range(n):
+                    square[i * n + j] += equations[i * n + k] * scale[k] ** 2 * equations[j * n + k]
+        solve(n, square, rest, multiplier)
+        for k in range(n):
+            found[k] = 0.0
+            for i in range(n):
+                found[k] += scale[k] ** 2 * equations[i * n + k] * multiplier[i]
+        # The equations are squared: what that leaves of them is taken out.
+        for i in range(n):
+            for j in range(n):
+                right[i] -= equations[i * n + j] * found[j]
+        solve(n, equations, right, rest)
+        for i in range(n):
+            found[i] += rest[i]
     for i in range(n):
-        for j in range(n):
-            right[i] -= equations[i * n + j] * out[j]
-    solve(n, equations, right, rest)
-    for i in range(n):
-        out[i] += rest[i]
+        out[each[i]] = found[i]
 
 
 @njit(cache=True, error_model="numpy")
 def _state(
-    gaps: Gaps, width: int, lane: int, mode: Array, way: Array, matrix: Array, load: Array, equations: Array,
-    right: Array,
+    gaps: Gaps, width: int, lane: int, mode: Array, way: Array, matrix: Array, load: Array, n: int, each: Index,
+    equations: Array, right: Array,
 ) -> None:  # fmt: skip
-    """State the equations of contacts whose modes are known."""
+    """State the equations of the n directions in `each`, those of the contacts that are not open."""
     ways = 1 + gaps.tangents
-    n = gaps.size * ways
+    size = gaps.size * ways
     for i in range(n):
+        row, contact, k = each[i], each[i] // ways, each[i] % ways
+        at, slips = contact * width + lane, mode[contact] == SLIP or mode[contact] == KNOWN
         right[i] = 0.0
         for j in range(n):
             equations[i * n + j] = 0.0
-    for contact in range(gaps.size):
-        first, at = contact * ways, contact * width + lane
-        slips = mode[contact] == SLIP or mode[contact] == KNOWN
-        for k in range(ways):
-            row = first + k
-            if k > 0 and slips:
-                # p_T = -(mu p_N + given) u
-                equations[row * n + row] = 1.0
-                equations[row * n + first] = gaps.mu[at] * way[row]
-                right[row] = -gaps.given[at] * way[row]
-            elif is_unknown(gaps, contact, k, mode[contact]):
-                for j in range(n):
-                    equations[row * n + j] = matrix[row * n + j]
-                right[row] = -load[row]
-            else:
-                equations[row * n + row] = 1.0
-                if k == 0 and mode[contact] != OPEN and gaps.soft[contact] != RIGID:
-                    right[row] = load[row]
+        if k > 0 and slips:
+            # p_T = -(mu p_N + given) u
+            equations[i * n + i] = 1.0
+            equations[i * n + i - k] = gaps.mu[at] * way[row]
+            right[i] = -gaps.given[at] * way[row]
+        elif is_unknown(gaps, contact, k, mode[contact]):
+            for j in range(n):
+                equations[i * n + j] = matrix[row * size + each[j]]
+            right[i] = -load[row]
+        else:
+            equations[i * n + i] = 1.0
+            if k == 0 and gaps.soft[contact] != RIGID:
+                right[i] = load[row]
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -166,7 +166,7 @@ def is_unknown(gaps: Gaps, contact: int, k: int, mode: float) -> bool:
         return False
     if k == 0:
         return gaps.kind[contact] != DRY and gaps.soft[contact] == RIGID  # type: ignore[no-any-return]
-    return mode == STICK and gaps.rubs[contact] > 0 and (k == 1 or gaps.kind[contact] != DRY)  # type: ignore[no-any-return]
+    return mode == STICK and gaps.rubs[contact] > 0 and (k == 1 or gaps.kind[contact] != DRY)
 
 
 @njit(cache=True, error_model="numpy")
@@ -316,7 +316,7 @@ def _alone(
             out[first + k] = push[k]
         return FINE
     mode[contact] = SLIP
-    return _slip(gaps, contact, gaps.mu[at], push, matrix, rest, way, out)
+    return _slip(gaps, contact, gaps.mu[at], push, matrix, rest, way, out)  # type: ignore[no-any-return]
 
 
 @njit(cache=True, error_model="numpy")

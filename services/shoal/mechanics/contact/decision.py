@@ -328,7 +328,7 @@ def _choose(tile: Tile, m: Arrays, w: Work, t: float, lane: int, state: Array) -
     # One whose friction has reached its limit may stick on if others take more of what they hold together.
     if _ask_again(tile, m, w, lane, state, STICK) == FINE and _has_room(tile, m, w, lane):
         return FINE
-    return _ask_again(tile, m, w, lane, state, KNOWN)
+    return _ask_again(tile, m, w, lane, state, KNOWN)  # type: ignore[no-any-return]
 
 
 @njit(cache=True, error_model="numpy")

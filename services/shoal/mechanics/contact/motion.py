@@ -123,7 +123,7 @@ def _is_held(tile: Tile, m: Arrays, w: Work, contact: int, lane: int, k: int, pa
     if k == 0:
         return m.gaps.soft[contact] == RIGID  # type: ignore[no-any-return]
     sticks = w.gaps.mode[contact * len(tile) + lane] == STICK
-    return sticks and (part == 1 or m.gaps.kind[contact] == DRY)  # type: ignore[no-any-return]
+    return sticks and (part == 1 or m.gaps.kind[contact] == DRY)
 
 
 @njit(cache=True, error_model="numpy")

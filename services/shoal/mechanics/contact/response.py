@@ -28,7 +28,7 @@ def has(g: Gaps, contact: int, way: int) -> bool:
     """Return whether a contact has a force along a direction: the normal, where it rubs a tangent."""
     if way == 0:
         return g.kind[contact] != DRY  # type: ignore[no-any-return]
-    return g.rubs[contact] > 0 and (way == 1 or g.kind[contact] != DRY)  # type: ignore[no-any-return]
+    return g.rubs[contact] > 0 and (way == 1 or g.kind[contact] != DRY)
 
 
 @njit(cache=True, error_model="numpy")
