@@ -395,7 +395,7 @@ def test_a_step_beyond_the_limit_is_refused_with_the_limit(integrator: str) -> N
 
 def test_an_integrator_that_is_stable_for_no_vibration_refuses_it_and_asks_for_no_smaller_step() -> None:
     with pytest.raises(InputError, match=r"^solver\.integrator: heun is stable at no step") as refusal:
-        check_step(FLEXIBLE, Choice("heun", "named by the scene", 0.0))
+        check_step(FLEXIBLE, Choice("heun", "named by the scene", 0.0), build(FLEXIBLE))
     assert "smaller" not in str(refusal.value)
 
 
