@@ -472,3 +472,14 @@ def test_a_block_at_rest_on_two_corners_shares_its_weight_and_its_friction_alike
     assert events(found, "slips") == pytest.approx([0.5 * G, 0.5 * G], abs=1e-9)
     assert found.points[0, 0, 0, 0] == pytest.approx(0.0, abs=1e-14)
     assert found.points[1, 0, 0, 0] == pytest.approx((6.0 - 0.5 * G) ** 3 / 6.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(("other", "codes"), [(0.1, ["contact-forces-not-unique"]), (0.3, [])])
+def test_friction_of_contacts_that_share_a_load_is_told_where_it_is_a_choice(other: float, codes: list[str]) -> None:
+    """Two contacts at one place: alike they are one, with different coefficients nothing tells what each bears."""
+    floors = {name: {"first": {"body": "B"}, "second": FLOOR, "mu": mu} for name, mu in (("one", 0.3), ("two", other))}
+    found = shoal.simulate(machine(POINT, floors, {"position": [0.0, 0.0], "velocity": [2.0, 0.0]}, 0.5))
+    assert found.ok
+    assert [one.code for one in found.findings] == codes
+    if not codes:
+        assert found.marker("P")[-1, 0] == pytest.approx(2.0 * 0.5 - 0.5 * 0.3 * G * 0.25, abs=1e-10)

@@ -46,7 +46,8 @@ class Verification:
     ground [m]; rejected: why the more careful run is itself not to be trusted; engine: that made the run, if it is not
     the native one, from which that of time is then how far it is off, whichever of them is wrong; deviations: the
     second runs, which estimate the error of any other quantity too; events: their comparison in time; undecided:
-    decisions on contacts that the time error leaves open, and the other outcome of each
+    decisions on contacts that the time error leaves open, and the other outcome of each; unclear: contacts whose forces
+    are a choice that moves the machine
     """
 
     errors: ErrorBudget
@@ -58,6 +59,7 @@ class Verification:
     deviations: tuple[Deviation, ...] = field(default=(), repr=False, compare=False)
     events: EventComparison | None = None
     undecided: tuple[Outcome, ...] = ()
+    unclear: tuple[str, ...] = ()
 
     def error(self, source: str) -> float:
         """Return the known error of a source [m]; 0 where none is known."""
@@ -116,6 +118,11 @@ class Verification:
         if not found and self.events is not None and self.events.differs:
             text = f"a more careful run has other events: {self.events.text}"
             found = [kinds.EVENTS_DIFFER.found(text, time=self.events.until)]
+        if self.unclear:
+            text = (
+                f"{', '.join(self.unclear)} bear a load together with different friction: how they share it is a choice"
+            )
+            found.append(kinds.UNCLEAR_CONTACTS.found(text))
         return found
 
     def _remarks(self) -> list[Finding]:
@@ -185,6 +192,7 @@ def verify(trajectory: Trajectory, scene: Scene, native: Engine | None = None) -
         deviations=tuple(one for each in found.values() for one in each or ()),
         events=in_time[0].events if in_time and "events" in trajectory.model else None,
         undecided=tuple(seen.outcomes),
+        unclear=tuple(trajectory.model.get("unclear_contacts", ())),
     )
 
 

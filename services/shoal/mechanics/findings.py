@@ -145,6 +145,12 @@ SIMULTANEOUS = Kind(
     Severity.CAUTION,
     "Contacts that close at one instant share one impact (Moreau); one after the other they lead elsewhere.",
 )
+UNCLEAR_CONTACTS = Kind(
+    "contact-forces-not-unique",
+    Severity.CAUTION,
+    "Rigid contacts bear a load together, and how they share it, which nothing tells, decides on their friction.",
+    "a law for each of these contacts, by which they give way",
+)
 EVENTS_DIFFER = Kind(
     "events-differ",
     Severity.CAUTION,

@@ -63,10 +63,10 @@ class GapWork(NamedTuple):
     """Work space of one tile, by contact and lane unless stated. A direction is the normal or a tangent of a contact.
 
     memory: the continuous angles of angular measures. value, rate: g [m or rad] and its rate; margin: of a contact that
-    slips the slip along `heading`, of one that sticks what is left to the limit of its friction. anchor:
-    where a joint sticks by dry friction [rad or m]; its value is the way from there. speed: at which one that
-    gives way was met [m/s]. before: value, rate,
-    force and margin at the beginning of a step, (4 * contacts, lanes). closed: whether the contact is closed, mode:
+    slips the slip along `heading`, of one that sticks what is left to the limit of its friction. anchor: where a joint
+    sticks by dry friction [rad or m]; its value is the way from there. speed: at which one that gives way was met
+    [m/s]. before: value, rate, force and margin at the beginning of a step, (4 * contacts, lanes). closed: whether the
+    contact is closed, unclear: whether its force was not unique at any time, in a way that moves the machine, mode:
     whether it sticks or slips; hit: what event of it a step has ended at. force: multiplier by direction, of a closed
     contact along the normal not negative [N or N m]; near: those of the last decision. slip, bias: rate of each
     direction, and its derivative for accelerations of zero. heading: direction of slip in the axes of the ground, (3 *
@@ -87,6 +87,7 @@ class GapWork(NamedTuple):
     speed: Array
     before: Array
     closed: Array
+    unclear: Array
     mode: Array
     hit: Array
     force: Array

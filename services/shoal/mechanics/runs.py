@@ -108,6 +108,7 @@ class Runs:
         left: list[tuple[Array, Array, Array]] = []
         happened: list[dict[str, Any]] = []
         closed: list[str] = []
+        unclear: list[str] = []
         states = States.room(moved, len(times)) if whole else None
         stop = Event() if workers > 1 else None
 
@@ -126,6 +127,7 @@ class Runs:
                 left.append(space.left)
                 happened.extend(space.events)
                 closed.extend(space.closed)
+                unclear.extend(space.unclear)
             if single not in self._found:
                 self._found[single] = pickle.dumps(self._facts(record.begin if single else None))
             gaps = space.march.frame.room.gaps
@@ -157,6 +159,7 @@ class Runs:
         facts["evaluations"] = int(largest[EVALUATIONS])
         if self.model.gaps.size and single:
             facts["events"], facts["closed_contacts"] = happened, closed
+            facts |= {"unclear_contacts": unclear} if unclear else {}
         if largest[CLOSENESS] > 0.0:
             facts["distance_from_singular"] = float(largest[CLOSENESS] ** -0.5)
         ended = Ended(moved, end, *left[0], motion[-1, :, d, 0].copy()) if left and not any(findings) else None

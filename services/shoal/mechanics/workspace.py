@@ -134,9 +134,16 @@ class Workspace:
     @property
     def closed(self) -> list[str]:
         """Joints whose contacts are closed at the end of a march of one lane."""
-        closed = self.march.frame.room.gaps.closed
+        return self._named(self.march.frame.room.gaps.closed)
+
+    @property
+    def unclear(self) -> list[str]:
+        """Joints and contacts whose forces, of several that move the machine differently, are a choice."""
+        return self._named(self.march.frame.room.gaps.unclear)
+
+    def _named(self, flags: Array) -> list[str]:
         names = (field.split(".")[1] for field in self._model.gap_fields)
-        return list(dict.fromkeys(name for name, one in zip(names, closed, strict=True) if one != 0.0))
+        return list(dict.fromkeys(name for name, one in zip(names, flags, strict=True) if one != 0.0))
 
     @property
     def left(self) -> tuple[Array, Array, Array]:

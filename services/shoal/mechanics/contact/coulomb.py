@@ -26,6 +26,8 @@ SETTLED = 1e-15
 """Change in a sweep, over the largest force, that ends the iteration."""
 DEPENDENT = 1e-11
 """Pivot, over the largest entry, below which a direction depends on others: its force is zero."""
+UNCLEAR = 1e-6
+"""Difference of accelerations, over what makes them up, by which forces that are not unique move a machine."""
 ANGLES = 32
 """Directions of slip in space that are tried, between which the one is bracketed."""
 
@@ -85,8 +87,11 @@ def solve(n: int, matrix: Array, load: Array, out: Array) -> int:
 @njit(cache=True, error_model="numpy")
 def hold(
     gaps: Gaps, width: int, lane: int, mode: Array, way: Array, matrix: Array, load: Array, near: Array, out: Array
-) -> None:
+) -> bool:
     """Find the forces p of contacts whose modes are known: their rates G p + c vanish but for slip.
+
+    Returns whether other forces that obey the same laws would move the machine otherwise, as of contacts that bear one
+    load and slip with different coefficients of friction.
 
     mode: by contact; way: direction of slip in the tangents, by direction; load: c, of a contact that gives way its
     force in place of that along the normal. near: forces of the same contacts, by direction and lane: where contacts
@@ -101,7 +106,9 @@ def hold(
             each[n], n = row, n + 1
     equations, right, found = np.zeros(n * n), np.zeros(n), np.zeros(n)
     _state(gaps, width, lane, mode, way, matrix, load, n, each, equations, right)
+    unclear = False
     if solve(n, equations, right, found) < n:
+        other = found.copy()
         scale, square, rest, multiplier = np.zeros(n), np.zeros(n * n), np.zeros(n), np.zeros(n)
         for i in range(n):
             contact, k = each[i] // ways, each[i] % ways
@@ -126,8 +133,16 @@ def hold(
         solve(n, equations, right, rest)
         for i in range(n):
             found[i] += rest[i]
+        for i in range(n):
+            change, whole = 0.0, 0.0
+            for j in range(n):
+                entry = matrix[each[i] * gaps.size * ways + each[j]]
+                change += entry * (found[j] - other[j])
+                whole += abs(entry) * (abs(found[j]) + abs(other[j]))
+            unclear = unclear or abs(change) > UNCLEAR * whole
     for i in range(n):
         out[each[i]] = found[i]
+    return unclear
 
 
 @njit(cache=True, error_model="numpy")
@@ -229,8 +244,45 @@ def decide(
     if _agrees(gaps, width, lane, mode, begun):
         for i in range(n):
             out[i] = begun[i]
+        if not impulsive:
+            _let_share(gaps, width, lane, asked, mode, way, matrix, load, near, out)
         return FINE
     return FINE if change <= 1e-9 * largest else UNDECIDED
+
+
+@njit(cache=True, error_model="numpy")
+def _let_share(
+    gaps: Gaps, width: int, lane: int, asked: Array, mode: Array, way: Array, matrix: Array, load: Array, near: Array,
+    out: Array,
+) -> None:  # fmt: skip
+    """Let contacts that others spare, but that would press as well, bear their share: of two at one place each half."""
+    ways = 1 + gaps.tangents
+    n = gaps.size * ways
+    modes, forces, most, some = np.zeros(gaps.size), np.zeros(n), 0.0, False
+    for contact in range(gaps.size):
+        most = max(most, out[contact * ways])
+    for contact in range(gaps.size):
+        first, modes[contact] = contact * ways, mode[contact]
+        if asked[contact] == OPEN or mode[contact] != OPEN or gaps.soft[contact] != RIGID:
+            continue
+        rate, size = load[first], abs(load[first])
+        for j in range(n):
+            rate += matrix[first * n + j] * out[j]
+            size += abs(matrix[first * n + j] * out[j])
+        if size > 0.0 and abs(rate) <= DEPENDENT * size:
+            modes[contact], near[first * width + lane] = KNOWN if asked[contact] == KNOWN else STICK, most
+            some = True
+    if not some:
+        return
+    hold(gaps, width, lane, modes, way, matrix, load, near, forces)
+    agrees = _agrees(gaps, width, lane, modes, forces)
+    for contact in range(gaps.size):
+        agrees = agrees and (modes[contact] == mode[contact] or forces[contact * ways] > UNCLEAR * most)
+    if agrees:
+        for contact in range(gaps.size):
+            mode[contact] = modes[contact]
+        for i in range(n):
+            out[i] = forces[i]
 
 
 @njit(cache=True, error_model="numpy")

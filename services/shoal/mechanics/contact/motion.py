@@ -37,8 +37,10 @@ def _hold(tile: Tile, m: Arrays, w: Work, lane: int) -> None:
             g.load[contact * (1 + m.gaps.tangents)] = press(m.gaps, g, contact, width, lane)[0]
     if m.gaps.tangents == 0 and not m.gives:
         complementarity.solve(size, g.matrix, g.load, mode, g.found)
-    else:
-        coulomb.hold(m.gaps, width, lane, mode, g.way, g.matrix, g.load, g.near, g.found)
+    elif coulomb.hold(m.gaps, width, lane, mode, g.way, g.matrix, g.load, g.near, g.found):
+        for contact in range(size):
+            if mode[contact] != 0.0:
+                g.unclear[contact * width + lane] = 1.0
 
 
 @njit(cache=True, error_model="numpy")
