@@ -195,7 +195,7 @@ def _resolve(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float, state: 
 
 @njit(cache=True, error_model="numpy")
 def _slide_together(m: Arrays, w: Work, width: int, lane: int) -> None:
-    """Where a contact begins to slip, let others begin whose friction is at its limit as well, but for round-off."""
+    """Let contacts whose friction is at its limit, but for round-off, begin to slip with one that does."""
     g, ways, some = w.gaps, 1 + m.gaps.tangents, False
     for contact in range(m.gaps.size):
         some = some or g.hit[contact * width + lane] == SLIDE
@@ -333,7 +333,7 @@ def _choose(tile: Tile, m: Arrays, w: Work, t: float, lane: int, state: Array) -
 
 @njit(cache=True, error_model="numpy")
 def _ask_again(tile: Tile, m: Arrays, w: Work, lane: int, state: Array, slides: float) -> int:
-    """Decide again, with what is asked about contacts that have begun to slip."""
+    """Decide the modes again, with contacts that have begun to slip taken to stick or to slip on (`slides`)."""
     g, width = w.gaps, len(tile)
     for contact in range(m.gaps.size):
         g.chosen[contact] = _asked(tile, m, w, lane, contact, state)

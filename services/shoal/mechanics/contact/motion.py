@@ -69,7 +69,7 @@ def accelerate(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, 
 
 @njit(cache=True, error_model="numpy")
 def _rub(tile: Tile, m: Arrays, w: Work, lane: int) -> None:
-    """The power that friction and contacts that give way take up, and what is left to the limit of stick."""
+    """Add the dissipated power of friction and compliant contacts; compute the margin to the limit of stick."""
     g, width, ways = w.gaps, len(tile), 1 + m.gaps.tangents
     for contact in range(m.gaps.size):
         at, first, square = contact * width + lane, contact * ways, 0.0
