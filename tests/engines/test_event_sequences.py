@@ -139,6 +139,33 @@ def test_an_order_that_is_known_or_does_not_matter_is_no_doubt() -> None:
     assert tie.model["verification"]["contacts_error"] is None
 
 
+def row(gap: float) -> Scene:
+    """Return three equal balls in a row without friction or loss, of which the first comes and the others stand."""
+    places = {"a": -1.0, "b": 0.0, "c": 0.2 + gap}
+    side = {name: {"body": name, "radius": 0.1} for name in places}
+    contacts = {one + two: {"first": side[one], "second": side[two], "restitution": 1.0} for one, two in ("ab", "bc")}
+    return Scene.parse({
+        "name": "row", "gravity": [0.0, 0.0], "contacts": contacts,
+        "markers": {name: {"body": name} for name in places},
+        "bodies": {name: {"kind": "rigid-body", "mass": 2.0, "inertia": 0.01} for name in places},
+        "initial": {name: {"position": [x, 0.0], "velocity": [1.0 if name == "a" else 0.0, 0.0]}
+                    for name, x in places.items()},
+        "solver": {"duration": 2.0},
+    })  # fmt: skip
+
+
+def test_an_impact_on_balls_that_touch_says_that_one_after_the_other_would_differ() -> None:
+    touch, apart = shoal.simulate(row(0.0)), shoal.simulate(row(1e-3))
+    # At once -1/3, 2/3, 2/3 (Moreau); one after the other 0, 0, 1. In the metric of the masses half of the impulses.
+    since = 2.0 - 0.8
+    assert touch.points[-1, :, 0, 0] == pytest.approx([-0.2 - since / 3, 2 / 3 * since, 0.2 + 2 / 3 * since], abs=1e-12)
+    (finding,) = touch.findings
+    assert finding.code == "simultaneous-impact"
+    assert finding.numbers["difference"] == pytest.approx(0.5, rel=1e-9)
+    assert apart.points[-1, :, 0, 0] == pytest.approx([-0.2, 1e-3, 0.201 + since - 1e-3], abs=1e-12)
+    assert not apart.findings
+
+
 def events(*letters: str) -> list[dict[str, Any]]:
     names = {"i": "impact", "o": "opens", "r": "rests"}
     return [{"time": 0.1 * k, "kind": names[one[0]], "joint": one[1]} for k, one in enumerate(letters)]

@@ -20,7 +20,7 @@ from shoal.engines.contract import Engine
 from shoal.engines.deviation import Deviation, turned
 from shoal.engines.gauss import GaussEngine
 from shoal.engines.theory import theory_deviations
-from shoal.engines.undecided import TOGETHER, Undecided, undecided
+from shoal.engines.undecided import Undecided, undecided
 from shoal.errors import ShoalError
 from shoal.mechanics.gap_history import moved
 from shoal.mechanics.integrators import facts
@@ -199,11 +199,9 @@ def of_contacts(seen: Examined) -> tuple[list[Deviation] | None, str]:
         if not (other.ok and same.ok):
             return None, f"effect of an open decision on a contact not estimated: {other.message or same.message}"
         away = Deviation("contacts", one.one, other, (seen.scene, seen.scene))
-        # A tie has another outcome to either side.
-        plain = 0.0 if each.what == TOGETHER else one.one.distance(same)
-        matters = away.distance > plain + one.distance
+        matters = away.distance > one.one.distance(same) + one.distance
         seen.outcomes.append(Outcome(each, away, matters))
-    return [each.away for each in seen.outcomes if each.decision.what != TOGETHER], ""
+    return [each.away for each in seen.outcomes], ""
 
 
 def of_mesh(seen: Examined) -> tuple[list[Deviation] | None, str]:

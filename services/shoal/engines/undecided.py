@@ -21,16 +21,15 @@ from shoal.mechanics.event_record import place_of
 from shoal.mechanics.gap_history import GapHistory, follow, instants
 from shoal.trajectory import Array
 
-GRAZING, ORDER, TOGETHER = "near-grazing", "order-of-impacts", "simultaneous"
+GRAZING, ORDER = "near-grazing", "order-of-impacts"
 
 
 @dataclass(frozen=True)
 class Undecided:
     """An open decision.
 
-    what: GRAZING, ORDER, or TOGETHER of two impacts at one instant, which are one by the law of impacts; joints: that
-    it is about; time [s]; margin: what decides, a gap [m or rad] or a time [s], and the error of that; shift: by how
-    much less there is of a gap, by its number, for the other outcome [m or rad]
+    what: GRAZING or ORDER; joints: that it is about; time [s]; margin: what decides, a gap [m or rad] or a time [s],
+    and the error of that; shift: by how much less there is of a gap, by its number, for the other outcome [m or rad]
     """
 
     what: str
@@ -46,8 +45,6 @@ class Undecided:
         names, at = " and ".join(self.joints), f"t = {self.time:.6g} s"
         if self.what == GRAZING:
             return f"{names} is met or missed by {self.margin:.1e} m or rad at {at}, known to {self.error:.1e}"
-        if self.what == TOGETHER:
-            return f"impacts of {names} at {at} are one by Moreau's law"
         return f"impacts of {names} at {at} are {self.margin:.1e} s apart, known to {self.error:.1e} s"
 
     def to_json(self) -> dict[str, Any]:
@@ -103,7 +100,8 @@ def _orders(history: GapHistory, events: Sequence[Event], error: Array) -> Itera
     """Yield neighbouring impacts of two gaps whose order is not known."""
     impacts = [event for event in events if event["kind"] == "impact"]
     for one, other in pairwise(impacts):
-        if place_of(one) == place_of(other):
+        # Those of one instant share one impact by the law of impacts.
+        if place_of(one) == place_of(other) or one["time"] == other["time"]:
             continue
         first, second = (_hit(history, event, error) for event in (one, other))
         if first is None or second is None:
@@ -111,8 +109,8 @@ def _orders(history: GapHistory, events: Sequence[Event], error: Array) -> Itera
         margin, doubt = other["time"] - one["time"], first[2] / first[1] + second[2] / second[1]
         if margin <= doubt:
             gap, rate, _ = first
-            joints, what = (place_of(one), place_of(other)), ORDER if margin else TOGETHER
-            yield Undecided(what, joints, one["time"], margin, doubt, {gap: -rate * (margin + doubt)})
+            joints = (place_of(one), place_of(other))
+            yield Undecided(ORDER, joints, one["time"], margin, doubt, {gap: -rate * (margin + doubt)})
 
 
 def _hit(history: GapHistory, event: Event, error: Array) -> tuple[int, float, float] | None:

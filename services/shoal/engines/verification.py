@@ -17,15 +17,16 @@ import numpy as np
 
 from shoal.engines.contract import Engine
 from shoal.engines.deviation import Deviation
-from shoal.engines.event_words import EventComparison
+from shoal.engines.event_words import Event, EventComparison
 from shoal.engines.gauss import GaussEngine
 from shoal.engines.sources import SOURCES, WRONG, Examined, Outcome, Rejected
-from shoal.engines.undecided import GRAZING, ORDER, TOGETHER
+from shoal.engines.undecided import GRAZING, ORDER
 from shoal.engines.ways import as_run
 from shoal.error_budget import ErrorBudget
 from shoal.findings import Finding
 from shoal.json_values import plain
 from shoal.mechanics import findings as kinds
+from shoal.mechanics.event_record import place_of
 from shoal.mechanics.reach import span
 from shoal.scene import GROUND, Scene
 from shoal.scene.joints import places
@@ -47,7 +48,7 @@ class Verification:
     the native one, from which that of time is then how far it is off, whichever of them is wrong; deviations: the
     second runs, which estimate the error of any other quantity too; events: their comparison in time; undecided:
     decisions on contacts that the time error leaves open, and the other outcome of each; unclear: contacts whose forces
-    are a choice that moves the machine
+    are a choice that moves the machine; shared: impacts of several contacts at one instant whose order matters
     """
 
     errors: ErrorBudget
@@ -60,6 +61,7 @@ class Verification:
     events: EventComparison | None = None
     undecided: tuple[Outcome, ...] = ()
     unclear: tuple[str, ...] = ()
+    shared: tuple[Event, ...] = ()
 
     def error(self, source: str) -> float:
         """Return the known error of a source [m]; 0 where none is known."""
@@ -107,7 +109,7 @@ class Verification:
 
     def _contacts(self) -> list[Finding]:
         """Return open decisions on contacts that matter, and the first event that a more careful run does not have."""
-        named = {GRAZING: kinds.NEAR_GRAZING, ORDER: kinds.ORDER_OPEN, TOGETHER: kinds.SIMULTANEOUS}
+        named = {GRAZING: kinds.NEAR_GRAZING, ORDER: kinds.ORDER_OPEN}
         found = [
             named[one.what].found(
                 f"{one.text}: the other outcome moves a marker by {away:.2g} m",
@@ -118,6 +120,16 @@ class Verification:
         if not found and self.events is not None and self.events.differs:
             text = f"a more careful run has other events: {self.events.text}"
             found = [kinds.EVENTS_DIFFER.found(text, time=self.events.until)]
+        if self.shared:
+            first, *_ = self.shared
+            times = sorted({event["time"] for event in self.shared})
+            names = " and ".join(dict.fromkeys(place_of(event) for event in self.shared if event["time"] == times[0]))
+            later = f" (and at {len(times) - 1} later instants)" if times[1:] else ""
+            text = (
+                f"the impact of {names} at t = {times[0]:.6g} s{later} is shared with contacts that touch: "
+                f"one after the other they would have impulses that differ by {first['order']:.2g} of their size"
+            )
+            found.append(kinds.SIMULTANEOUS.found(text, time=times[0], instants=len(times), difference=first["order"]))
         if self.unclear:
             text = (
                 f"{', '.join(self.unclear)} bear a load together with different friction: how they share it is a choice"
@@ -193,6 +205,7 @@ def verify(trajectory: Trajectory, scene: Scene, native: Engine | None = None) -
         events=in_time[0].events if in_time and "events" in trajectory.model else None,
         undecided=tuple(seen.outcomes),
         unclear=tuple(trajectory.model.get("unclear_contacts", ())),
+        shared=tuple(event for event in trajectory.model.get("events", ()) if "order" in event),
     )
 
 

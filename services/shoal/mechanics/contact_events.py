@@ -11,9 +11,8 @@ import numpy as np
 from numba import njit
 
 from shoal.mechanics import kernels
-from shoal.mechanics.contact.decision import HIT, LIFT, SLIDE, STOP
 from shoal.mechanics.dynamics import Work
-from shoal.mechanics.gaps import DRY, RIGID, SLIP
+from shoal.mechanics.gaps import DRY, HIT, LIFT, RIGID, SLIDE, SLIP, STOP
 from shoal.mechanics.integrators.scheme import Scheme, interpolate
 from shoal.mechanics.marched import LoopRoom
 from shoal.mechanics.model import Arrays

@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from shoal.mechanics.contact.decision import HIT, KINDS, LIFT
+from shoal.mechanics.contact.decision import KINDS
+from shoal.mechanics.gaps import HIT, LIFT
 from shoal.mechanics.numerics.tile import Array
 
+UNCLEAR = 1e-6
+"""Part of the impulses by which those of another order may differ: they are known to the root of round-off."""
 LAST = 3
 """Impacts whose times give the limit of a geometric sequence (Aitken's delta-squared process)."""
 
@@ -15,7 +18,8 @@ LAST = 3
 def recorded(log: Array, fields: Sequence[str], closed: Array) -> list[dict[str, Any]]:
     """Return events in the order of time: time [s], joint or contact, kind, and the impulse [N s or N m s] of impacts.
 
-    log: time, contact, kind of `decision` and impulse of each, (events, 4). fields: what states the contacts, as
+    Impacts of several contacts of which the order matters have `order`, how far their impulses would be from those at
+    once, relative to these (`impact`). log: as of `GapWork`, (events, RECORD). fields: what states the contacts, as
     `contacts.NAME` or `joints.NAME.stops`. closed: which are closed at the end, not 0. A contact that stays closed
     after several impacts `rests` from where their times accumulate, with the number of `impacts`; it follows the last
     of these in the list.
@@ -33,11 +37,13 @@ def recorded(log: Array, fields: Sequence[str], closed: Array) -> list[dict[str,
             times = [found[k]["time"] for k in numbers]
             rests[numbers[-1]] = {"time": _limit(times), **places[contact], "kind": "rests", "impacts": len(numbers)}
 
-    for time, number, kind, push in log.tolist():
+    for time, number, kind, push, order in log.tolist():
         contact = int(number)
         event = {"time": time, **places[contact], "kind": KINDS[kind]}
         if kind == HIT:
             event["impulse"] = push
+            if order > UNCLEAR:
+                event["order"] = order
             impacts.setdefault(contact, []).append(len(found))
         elif kind == LIFT:
             rest(contact)

@@ -143,7 +143,7 @@ ORDER_OPEN = Kind(
 SIMULTANEOUS = Kind(
     "simultaneous-impact",
     Severity.CAUTION,
-    "Contacts that close at one instant share one impact (Moreau); one after the other they lead elsewhere.",
+    "Contacts that touch at one instant share one impact (Moreau); one after the other they would leave other rates.",
 )
 UNCLEAR_CONTACTS = Kind(
     "contact-forces-not-unique",

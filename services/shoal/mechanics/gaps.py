@@ -25,6 +25,8 @@ STIFFNESS, EXPONENT, DAMPING, LOSS, VISCOSITY = range(5)
 LAW_SIZE = 5
 STICK, SLIP = 1.0, 2.0
 """Modes of closed contacts that rub."""
+HIT, LIFT, SLIDE, STOP = 1.0, -1.0, 2.0, 3.0
+"""Events: a gap closes, a contact opens, one that sticks begins to slip, a slip ends."""
 
 
 class Gaps(NamedTuple):
@@ -74,9 +76,10 @@ class GapWork(NamedTuple):
     acceleration by a unit force, (directions * unknowns, lanes). none: the acceleration without forces, unit: a unit
     force, (rows, lanes). reaction: multipliers of the constraints: without forces, by a unit force of each direction,
     and as they are, ((directions + 2) * constraints, lanes). matrix, load, found, way, chosen: of one lane. pair:
-    `pairs.describe`. log: time, contact, kind and impulse of each event of the first lane, (4 * LOGGED,); number: of
-    events, decisions: times at which contacts were decided on, alone: whether a lane of a tile of several comes near an
-    event, which it has to meet alone, (lanes,).
+    `pairs.describe`. order: of the last impact, how far the impulses of contacts that strike one after the other would
+    be from those at once, (lanes,). log: time, contact, kind, impulse and `order` of each event of the first lane,
+    (RECORD * LOGGED,); number: of events, decisions: times at which contacts were decided on, alone: whether a lane of
+    a tile of several comes near an event, which it has to meet alone, (lanes,).
     """
 
     memory: Array
@@ -107,14 +110,15 @@ class GapWork(NamedTuple):
     way: Array
     chosen: Array
     pair: Array
+    order: Array
     log: Array
     number: Array
     decisions: Array
     alone: Array
 
 
-LOGGED = 4096
-"""So many events of the first lane are kept."""
+LOGGED, RECORD = 4096, 5
+"""So many events of the first lane are kept, of so many numbers each."""
 
 
 def room(width: int, g: Gaps, unknowns: int, rows: int, constraints: int) -> GapWork:
@@ -128,7 +132,7 @@ def room(width: int, g: Gaps, unknowns: int, rows: int, constraints: int) -> Gap
         "bias": by_way,
         "heading": 3 * each, "axes": 9 * each, "gradient": vectors, "response": vectors, "none": whole, "unit": whole,
         "reaction": reaction, "matrix": ways * ways, "load": ways, "found": ways, "way": ways, "chosen": n,
-        "pair": pairs.ROOM if g.pairs.size else 0, "log": 4 * LOGGED if n else 0,
+        "pair": pairs.ROOM if g.pairs.size else 0, "order": width if n else 0, "log": RECORD * LOGGED if n else 0,
         "number": width if n else 0, "decisions": width if n else 0, "alone": width if n else 0,
     }  # fmt: skip
     return GapWork._make([np.zeros(sizes.get(name, each)) for name in GapWork._fields])

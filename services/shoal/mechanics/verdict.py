@@ -11,7 +11,7 @@ from shoal.mechanics import findings as kinds
 from shoal.mechanics import reach as reaches
 from shoal.mechanics.affine import NEGLIGIBLE
 from shoal.mechanics.constraints import OPEN
-from shoal.mechanics.contact import coulomb, decision
+from shoal.mechanics.contact import coulomb, decision, impact
 from shoal.mechanics.forces import ANGLE, LAW, STIFFNESS
 from shoal.mechanics.functions import value
 from shoal.mechanics.integrators import Choice, facts
@@ -52,7 +52,7 @@ CONTACT_TROUBLES = {
     coulomb.SEVERAL: kinds.SEVERAL_MOTIONS,
     coulomb.UNDECIDED: kinds.UNDECIDED_CONTACTS,
     decision.TOO_MANY: kinds.TOO_MANY_EVENTS,
-    decision.GAINS: kinds.IMPACT_GAINS,
+    impact.GAINS: kinds.IMPACT_GAINS,
 }
 """Why contacts end a motion."""
 _JUDGED = slice(FARTHEST, CONSTRAINT_DRIFT + 1)

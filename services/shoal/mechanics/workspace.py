@@ -13,6 +13,7 @@ from shoal.mechanics import forces, states
 from shoal.mechanics.dynamics import Work, derived_rows, work_space
 from shoal.mechanics.elements.families import lay
 from shoal.mechanics.event_record import recorded
+from shoal.mechanics.gaps import RECORD
 from shoal.mechanics.halts import Halts
 from shoal.mechanics.integrators import Choice, choose, facts
 from shoal.mechanics.integrators.scheme import connect
@@ -126,7 +127,7 @@ class Workspace:
         gaps, fields = self.march.frame.room.gaps, self._model.gap_fields
         if not fields:
             return []
-        log = gaps.log[: 4 * int(gaps.number[0])].reshape(-1, 4)
+        log = gaps.log[: RECORD * int(gaps.number[0])].reshape(-1, RECORD)
         # Where a log is full, what became of its contacts later is not known.
         whole = len(log) == int(gaps.number[0])
         return recorded(log, fields, gaps.closed if whole else np.zeros_like(gaps.closed))

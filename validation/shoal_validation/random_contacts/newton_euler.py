@@ -198,8 +198,8 @@ class NewtonEuler:
         self.decisions += 1
         if self.decisions > MOST:
             raise UndecidedError(f"more than {MOST} events")
-        touching = sorted(set(self.closed) | hits)
         q, v = self.q, self.v
+        touching = sorted(set(self.closed) | hits | (self._standing() if hits else set()))
         pins, rows, pin_bias, bias = self._known(q, v, touching)
         reduced = self._reduced(pins)
         matrix = rows @ reduced @ rows.T
@@ -227,6 +227,14 @@ class NewtonEuler:
             closed = [i for i, mode in enumerate(modes) if mode != OPEN and push[2 * i] > 0.0]
             self.closed = {touching[i]: modes[i] for i in closed}
         self._project()
+
+    def _standing(self) -> set[int]:
+        """Return contacts whose surfaces touch and do not separate, though no force holds them."""
+        found = {}
+        for number in range(len(self.contacts)):
+            gap, normal, _ = self.surfaces(number, self.q)
+            found[number] = gap <= TOUCH and normal @ self.v <= FINE * float(np.max(np.abs(self.v)))
+        return {number for number, stands in found.items() if stands}
 
     def _project(self) -> None:
         """Close pins and contacts again."""

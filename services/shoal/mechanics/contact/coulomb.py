@@ -216,7 +216,7 @@ def decide(
                         rest[row] += matrix[row * n + j] * out[j]
             if gaps.soft[contact] != RIGID:
                 rest[first] = load[first]
-            found = _alone(gaps, contact, width, lane, asked[contact], mode, way, matrix, rest, out, impulsive)
+            found = alone(gaps, contact, width, lane, asked[contact], mode, way, matrix, rest, out, impulsive)
             if found > outcome % TROUBLES:
                 outcome = found + TROUBLES * contact
             for row in range(first, first + ways):
@@ -310,7 +310,7 @@ def limit(gaps: Gaps, contact: int, width: int, lane: int, normal: float, static
 
 
 @njit(cache=True, error_model="numpy")
-def _alone(
+def alone(
     gaps: Gaps, contact: int, width: int, lane: int, asked: float, mode: Array, way: Array, matrix: Array, rest: Array,
     out: Array, impulsive: bool,
 ) -> int:  # fmt: skip

@@ -1,8 +1,7 @@
 """Decisions at an event: impacts, then which contacts are closed, and which of those stick or slip.
 
 Of all accelerations with g_q a >= -bias for gaps with g = g' = 0 the true one deviates least from the free one (Gauss's
-principle with inequalities). An impact changes the rates by the least that brings g'+ + e g'- >= 0 (Moreau 1988).
-Friction is that of `coulomb`, of forces as of impulses.
+principle with inequalities). Friction is that of `coulomb`, impacts are those of `impact`.
 """
 
 from __future__ import annotations
@@ -11,32 +10,23 @@ import numpy as np
 from numba import njit
 
 from shoal.compile import function_pointers
-from shoal.mechanics.contact import complementarity, coulomb, motion, response
+from shoal.mechanics.contact import complementarity, coulomb, impact, motion, response
 from shoal.mechanics.contact.coulomb import FINE, KNOWN, OPEN, TROUBLES
+from shoal.mechanics.contact.impact import APART, SEPARATES, STILL, TOUCHES
 from shoal.mechanics.dynamics import ACCELERATION, Work
-from shoal.mechanics.gaps import DRY, LOGGED, RIGID, SLIP, STICK, press
+from shoal.mechanics.gaps import DRY, HIT, LIFT, LOGGED, RECORD, RIGID, SLIDE, SLIP, STICK, STOP, press
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics.tile import Array, Tile
 
-HIT, LIFT, SLIDE, STOP = 1.0, -1.0, 2.0, 3.0
-"""Events: a gap closes, a contact opens, one that sticks begins to slip, a slip ends."""
 MEET = 4.0
-"""A contact that gives way is met."""
+"""Event beside those of `gaps`: a contact that gives way is met."""
 KINDS = {HIT: "impact", MEET: "touches", LIFT: "opens", SLIDE: "slips", STOP: "sticks"}
-APART, TOUCHES, SEPARATES = 0.0, 1.0, 2.0
-"""States of a contact at an event."""
-PASSES = 10_000
-"""Impacts at one place in no time after which they are left as they are."""
 MOST = 100_000
 """Events after which a motion is given up."""
-STILL = 1e-12
-"""Rate of a contact, over the largest of a coordinate, that is round-off."""
-TOO_MANY, GAINS = 4, 5
-"""Troubles beside the outcomes of `coulomb.decide`: more than `MOST` events; an impact that gains energy."""
+TOO_MANY = 4
+"""Trouble beside the outcomes of `coulomb.decide`: more than `MOST` events."""
 MARGIN = 1e-9
 """Part of an acceleration, or of the limit of friction, that is round-off of the location of an event."""
-GAIN = 1e-9
-"""Energy gained by an impact, over the work of its impulses, that is round-off."""
 
 
 @njit(cache=True, error_model="numpy")
@@ -50,7 +40,7 @@ def decide(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float) -> None:
     for lane in range(width):
         g.decisions[lane] += 1.0
         if g.decisions[lane] > MOST:
-            _end(m, w, t, width, lane, TOO_MANY + TROUBLES * _struck(size, width, lane, g.hit))
+            _end(m, w, t, width, lane, TOO_MANY + TROUBLES * impact.struck(size, width, lane, g.hit))
     # The forces just before the event, which its search has left at other times.
     function_pointers.call(m.table.motion, (tile, m, w, t, w.z, w.zdot, tolerance, w.a, ACCELERATION))
     for at in range(size * width):
@@ -98,15 +88,6 @@ def _strikes(size: int, width: int, lane: int, hit: Array) -> bool:
 
 
 @njit(cache=True, error_model="numpy")
-def _struck(size: int, width: int, lane: int, hit: Array) -> int:
-    """Return the first contact of a lane whose gap has closed."""
-    found = 0
-    for number in range(size - 1, -1, -1):
-        found = number if hit[number * width + lane] == HIT else found
-    return found
-
-
-@njit(cache=True, error_model="numpy")
 def _release(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float, state: Array) -> None:
     """Open all contacts of the lanes that are decided on; find the acceleration without them, and their responses."""
     g, width, size = w.gaps, len(tile), m.gaps.size
@@ -144,7 +125,9 @@ def _strike(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float, state: A
         response.respond(tile, m, w, t, w.z, w.zdot, tolerance, state)
         for lane in range(width):
             if _strikes(size, width, lane, g.hit):
-                _impact(tile, m, w, t, lane, state, plastic, impulse)
+                outcome = impact.strike(tile, m, w, lane, state, plastic, impulse)
+                if outcome != FINE:
+                    _end(m, w, t, width, lane, outcome)
         _release(tile, m, w, t, tolerance, state)
         lower = False
         for lane in range(width):
@@ -209,84 +192,6 @@ def _slide_together(m: Arrays, w: Work, width: int, lane: int) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def _impact(tile: Tile, m: Arrays, w: Work, t: float, lane: int, state: Array, plastic: Array, impulse: Array) -> None:
-    """Change the rates of one lane by the impulses of its contacts, and mark those that separate.
-
-    Contacts that an impact lets approach strike next, at the same place: of two that throw the body to and fro the
-    impacts may accumulate in no time at finite rates.
-    """
-    g, width, size, ways = w.gaps, len(tile), m.gaps.size, 1 + m.gaps.tangents
-    response.matrix(tile, m, w, lane, state)
-    fastest, rates, total = _fastest(m, w, width, lane), np.zeros(size * ways), np.zeros(size * ways)
-    for contact in range(size):
-        at, first = contact * width + lane, contact * ways
-        impulse[at] = 0.0
-        if state[at] == APART:
-            continue
-        for k in range(ways):
-            rates[first + k] = g.rate[at] if k == 0 else g.slip[(first + k) * width + lane]
-    for turn in range(PASSES):
-        some = turn == 0
-        for contact in range(size):
-            at, first = contact * width + lane, contact * ways
-            member = state[at] != APART and rates[first] <= STILL * fastest and m.gaps.soft[contact] == RIGID
-            some = some or (member and m.gaps.kind[contact] != DRY and rates[first] < -STILL * fastest)
-            g.chosen[contact] = STICK if member else OPEN
-            restitution = 0.0 if plastic[at] != 0.0 else m.gaps.restitution[at]
-            for k in range(ways):
-                e = restitution if k == 0 else m.gaps.tangential[at]
-                g.load[first + k] = (1.0 + e) * rates[first + k] if member else 0.0
-        if not some:
-            break
-        if m.gaps.tangents == 0 and not m.gives:
-            complementarity.complementary(size, g.matrix, g.load, g.chosen, g.found)
-        else:
-            outcome = coulomb.decide(m.gaps, width, lane, g.chosen, g.way, g.matrix, g.load, g.found, True)
-            if outcome != FINE:
-                _end(m, w, t, width, lane, outcome)
-                break
-        if _gains(m, w, rates):
-            _end(m, w, t, width, lane, GAINS + TROUBLES * _struck(size, width, lane, g.hit))
-            break
-        for direction in range(size * ways):
-            rates[direction] += response.after(tile, m, w, direction)
-            total[direction] += g.found[direction]
-    for direction in range(size * ways):
-        g.found[direction] = total[direction]
-    response.push(tile, m, w, lane, w.zdot)
-    for contact in range(size):
-        at = contact * width + lane
-        first = contact * ways
-        strikes = total[first] * g.matrix[first * size * ways + first] > STILL * fastest
-        impulse[at] = total[first] if strikes else 0.0
-        rigid = m.gaps.kind[contact] != DRY and m.gaps.soft[contact] == RIGID
-        if state[at] != APART and rigid and rates[contact * ways] > STILL * fastest:
-            state[at] = SEPARATES
-
-
-@njit(cache=True, error_model="numpy")
-def _fastest(m: Arrays, w: Work, width: int, lane: int) -> float:
-    """Return the largest rate of a coordinate, against which slower rates of contacts are round-off."""
-    most = 0.0
-    for i in range(lane, m.unknowns * width, width):
-        most = max(most, abs(w.zdot[i]))
-    return most
-
-
-@njit(cache=True, error_model="numpy")
-def _gains(m: Arrays, w: Work, rates: Array) -> bool:
-    """Return whether impulses p do work p'(v + G p / 2) > 0: the law of the impact gains energy."""
-    size, work, whole = m.gaps.size * (1 + m.gaps.tangents), 0.0, 0.0
-    for i in range(size):
-        change = 0.0
-        for j in range(size):
-            change += 0.5 * w.gaps.matrix[i * size + j] * w.gaps.found[j]
-        work += w.gaps.found[i] * (rates[i] + change)
-        whole += abs(w.gaps.found[i]) * (abs(rates[i]) + abs(change))
-    return work > GAIN * whole
-
-
-@njit(cache=True, error_model="numpy")
 def _end(m: Arrays, w: Work, t: float, width: int, lane: int, trouble: int) -> None:
     """End the motion of a lane, which is no number from here on."""
     if w.gauss.ended[lane] < 0.0:
@@ -302,8 +207,9 @@ def log(m: Arrays, w: Work, t: float, contact: int, width: int, lane: int, kind:
     g.number[lane] += 1.0
     count = int(g.number[lane])
     if lane == 0 and count <= LOGGED:
-        first = 4 * (count - 1)
+        first = RECORD * (count - 1)
         g.log[first], g.log[first + 1], g.log[first + 2], g.log[first + 3] = t, contact, kind, impulse
+        g.log[first + 4] = g.order[lane] if kind == HIT else 0.0
 
 
 @njit(cache=True, error_model="numpy")
@@ -422,7 +328,7 @@ def _asked(tile: Tile, m: Arrays, w: Work, lane: int, contact: int, state: Array
         response.along_heading(m, w, contact, width, lane)
         return KNOWN
     # A slip is none that such accelerations stop within the resolution, as a hop is.
-    if speed <= max(np.sqrt(2.0 * push * m.gaps.resolution), STILL * _fastest(m, w, width, lane)):
+    if speed <= max(np.sqrt(2.0 * push * m.gaps.resolution), STILL * impact.fastest(m, w, width, lane)):
         return STICK
     for k in range(1, ways):
         g.way[contact * ways + k] = g.slip[(contact * ways + k) * width + lane] / speed
