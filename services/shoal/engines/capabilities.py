@@ -37,12 +37,14 @@ FEATURES = (
     "one-sided distances",
     "exact stick",
     "contacts",
+    "play",
 )
 _FIELDS = {
     "coulomb": "dry friction",
     "drag": "quadratic drag",
     "mu": "friction by joint forces",
     "stops": "stops",
+    "play": "play",
     "first_to": "angles of places",
     "second_to": "angles of places",
 }

@@ -20,15 +20,17 @@ def recorded(log: Array, fields: Sequence[str], closed: Array) -> list[dict[str,
 
     Impacts of several contacts of which the order matters have `order`, how far their impulses would be from those at
     once, relative to these (`impact`). log: as of `GapWork`, (events, RECORD). fields: what states the contacts, as
-    `contacts.NAME` or `joints.NAME.stops`. closed: which are closed at the end, not 0. A contact that stays closed
-    after several impacts `rests` from where their times accumulate, with the number of `impacts`; it follows the last
-    of these in the list.
+    `contacts.NAME`, `joints.NAME.stops` or, of a guide with play, `joints.NAME.play.CORNER`. closed: which are
+    closed at the end, not 0. A contact that stays closed after several impacts `rests` from where their times
+    accumulate, with the number of `impacts`; it follows the last of these in the list.
     """
     found: list[dict[str, Any]] = []
     impacts: dict[int, list[int]] = {}
     rests: dict[int, dict[str, Any]] = {}
     parts = [field.split(".") for field in fields]
-    places = [{part[0].removesuffix("s"): part[1]} for part in parts]
+    places: list[dict[str, Any]] = [
+        {part[0].removesuffix("s"): part[1]} | ({"corner": int(part[3])} if len(part) > 3 else {}) for part in parts
+    ]
 
     def rest(contact: int) -> None:
         """Let the impacts of a contact so far end in rest."""

@@ -19,6 +19,7 @@ from shoal.scene import Function, Scene
 from shoal.scene.joints import (
     GROUND,
     Attachment,
+    Clearance,
     CoupledCoordinate,
     Coupling,
     Cylindrical,
@@ -387,6 +388,8 @@ def conditions(joint: Any, dimensions: int = 2) -> list[Any]:
         if type(joint) in other:
             raise InputError(f"joints: {joint.kind!r} is no joint of scenes with {dimensions} dimensions")
         raise NotImplementedError(f"the mechanics knows no conditions of a joint of kind {joint.kind!r}")
+    if isinstance(joint, Clearance) and joint.play is not None:
+        return []  # contacts hold it, see `scene.clearances`
     return table[type(joint)](joint)
 
 

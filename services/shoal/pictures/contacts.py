@@ -15,6 +15,7 @@ from shoal.pictures.links import At
 from shoal.pictures.outline import INSIDE
 from shoal.pictures.style import BLACK, GREEN, ORANGE, PURPLE, VERMILION
 from shoal.scene import GROUND, Attachment, Revolute, Rod, Scene, Slider
+from shoal.scene.clearances import contacts_of, with_play
 from shoal.scene.contacts import ContactSurface
 from shoal.scene.joints import Distance, places
 from shoal.trajectory import Array
@@ -59,13 +60,14 @@ def mark_impacts(panel: Axes, times: Array, path: Array, hits: Array, label: str
 def struck(scene: Scene, events: Sequence[Event]) -> dict[str, Array]:
     """Return the times [s] at which impacts may change the rates of markers, by name.
 
-    They are impacts of bodies that joints connect with that of the marker. Ropes, struts and contacts connect none.
+    They are impacts of bodies that joints connect with that of the marker. Ropes, struts, contacts and joints with play
+    connect none.
     """
     sides = {name: [side.body for side in places(joint)] for name, joint in scene.joints.items()}
     touching = {name: [contact.first.body, contact.second.body] for name, contact in scene.contacts.items()}
     group = {name: name for name in scene.bodies}
     for name, bodies in sides.items():
-        if getattr(scene.joints[name], "keeps", "exactly") == "exactly":
+        if getattr(scene.joints[name], "keeps", "exactly") == "exactly" and name not in with_play(scene):
             roots = {group[body] for body in bodies if body != GROUND}
             group = {key: min(roots) if root in roots else root for key, root in group.items()}
     groups = {name: {group.get(body) for body in bodies} for name, bodies in (sides | touching).items()}
@@ -93,10 +95,13 @@ class Limits:
                 ends = [joint.stops.min, joint.stops.max]
                 lines = self._arc(ends) if isinstance(joint, Revolute) else self._ticks(ends, joint)
                 self._drawn[name] = self._carried(joint.first, lines)
-        for name, contact in scene.contacts.items() if scene.dimensions == 2 else ():
+        for path, contact in contacts_of(scene).items() if scene.dimensions == 2 else ():
             for field, side in (("first", contact.first), ("second", contact.second)):
                 if (outline := self._surface(side)) is not None and self._has_axes(side):
-                    self._drawn[f"{name} {field}"] = self._carried(side, outline)
+                    self._drawn[f"{path.removeprefix('contacts.')} {field}"] = self._carried(side, outline)
+        for name, guide in with_play(scene).items():
+            if isinstance(guide, Slider):
+                self._drawn[f"{name} box"] = self._carried(guide.second, self._box(guide))
 
     def shown(self, at: At, frames: int) -> dict[str, Array]:
         """Return lines by joint [m], nan between them, (frames, points, 2)."""
@@ -127,6 +132,12 @@ class Limits:
         angle = np.linspace(0.0, 2.0 * np.pi, 2 * ARC)
         radius = side.radius if side.hole is None else side.hole
         return radius * np.stack([np.cos(angle), np.sin(angle)], axis=1) if radius else None
+
+    def _box(self, joint: Slider) -> Array:
+        """Return the box of a slider with play about its place [m], (points, 2)."""
+        assert joint.size is not None
+        corners = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1], [1, 1]])
+        return np.asarray(0.5 * corners * np.array(joint.size))
 
     def _ticks(self, ends: list[float | None], joint: Slider) -> Array:
         """Return ticks across the line of a slider, from its place [m], (points, 2)."""

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Any
 
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
+from shoal.scene.contact_law import ContactLaw
 from shoal.scene.joints import Attachment, origin_of_ground
 from shoal.scene.record import Angle, Axis, NonNegative, Positive, Record
 
@@ -40,49 +42,6 @@ class ContactSurface(Attachment):
         if self.axis is not None and not np.all(self.radius):
             raise ValueError("axis: is that of a disc; state its radius")
         return self
-
-
-class ContactLaw(Record):
-    """The force of a contact that gives way by a depth d: stiffness d^exponent (1 + damping d') + viscosity d'.
-
-    Hertz's law, Hunt's and Crossley's (1975) and a spring with a damper are of this form.
-    """
-
-    stiffness: Positive
-    """Force at a depth of 1 m [N/m^exponent]."""
-    exponent: Annotated[float, Field(ge=1)] = 1.5
-    """Power of the depth [1]: 1.5 of Hertz's law for spheres, 1 of a spring."""
-    damping: NonNegative = 0.0
-    """Part of the force by the rate of the depth [s/m], of Hunt and Crossley."""
-    restitution: Annotated[float, Field(gt=0, le=1)] | None = None
-    """Rate after an impact of free bodies over that before [1], from which `damping` follows at each touch."""
-    viscosity: NonNegative = 0.0
-    """Force by the rate of the depth [N s/m]; where both pull, the contact opens."""
-
-    @model_validator(mode="after")
-    def _one_damping(self) -> ContactLaw:
-        if self.restitution is not None and (np.any(self.damping) or np.any(self.viscosity)):
-            raise ValueError("restitution: damping or viscosity is stated as well; state one of them")
-        return self
-
-    @property
-    def numbers(self) -> tuple[Any, ...]:
-        """Return stiffness, exponent, damping, damping times the rate at which the contact is met, and viscosity."""
-        loss = 0.0 if self.restitution is None else np.vectorize(_loss)(self.restitution)
-        return self.stiffness, self.exponent, self.damping, loss, self.viscosity
-
-
-def _loss(e: float) -> float:
-    """Return damping times the rate v before, x, for a restitution e: ln((1 + x) / (1 - e x)) = (1 + e) x.
-
-    Of m d'' = -K d^n (1 + x d'/v): d' dd' / (1 + x d'/v) = -K d^n dd / m, integrated from v to -e v.
-    """
-    # Importing scipy takes longer than reading a scene.
-    from scipy.optimize import brentq
-
-    if e >= 1.0:
-        return 0.0
-    return float(brentq(lambda x: np.log1p(x) - np.log1p(-e * x) - (1.0 + e) * x, 1e-9, (1.0 - 1e-12) / e))
 
 
 Side = Annotated[ContactSurface, BeforeValidator(origin_of_ground)]
@@ -135,12 +94,15 @@ class Contact(Record):
         return self
 
 
-def check_contacts(scene: Any) -> None:
-    """Raises ValueError where surfaces are of other dimensions than the scene, or of bodies that have none."""
-    for name, contact in scene.contacts.items():
+def check_contacts(scene: Any, contacts: Mapping[str, Contact]) -> None:
+    """Raises ValueError where surfaces are of other dimensions than the scene, or of bodies that have none.
+
+    contacts: by the path of what states them
+    """
+    for path, contact in contacts.items():
         wrong, right = ("line", "plane") if scene.dimensions == 3 else ("plane", "line")
         if contact.second.shape == wrong:
-            where = f"contacts.{name}.second.{wrong}"
+            where = f"{path}.second.{wrong}"
             raise ValueError(f"{where}: with dimensions: {scene.dimensions} a flat surface is a {right}")
         for field in ("first", "second"):
             side = getattr(contact, field)
@@ -150,12 +112,12 @@ def check_contacts(scene: Any) -> None:
             if body is None or turns:
                 continue
             if side.axis is not None:
-                raise ValueError(f"contacts.{name}.{field}.axis: {side.body} is no rigid body, which a disc needs")
+                raise ValueError(f"{path}.{field}.axis: {side.body} is no rigid body, which a disc needs")
             if side.shape in ("line", "plane"):
-                where = f"contacts.{name}.{field}.{side.shape}"
+                where = f"{path}.{field}.{side.shape}"
                 raise ValueError(f"{where}: {side.body} is no rigid body, which a flat surface needs")
             if contact.rubs and kind != "point-mass" and np.any(side.radius or side.hole or 0.0):
                 raise ValueError(
-                    f"contacts.{name}.{field}: friction at a radius of {side.body}, which bends; weld a rigid body to "
-                    "it, or leave out mu"
+                    f"{path}.{field}: friction at a radius of {side.body}, which bends; weld a rigid body to it, or "
+                    "leave out mu"
                 )

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import BeforeValidator, Field, model_validator
 
+from shoal.scene.contact_law import ContactLaw
 from shoal.scene.function import Function
 from shoal.scene.record import Angle, Axis, NonNegative, Positive, Record, Vector, Vector3, kinds
 
@@ -90,6 +91,32 @@ class Stops(Record):
         return self
 
 
+class Clearance(Tie):
+    """A joint that may have play: its surfaces strike, slide, stick and separate as those of a contact do."""
+
+    play: Positive | None = None
+    """Clearance to each side where the joint is centred [m]; by default it has none."""
+    restitution: Annotated[float, Field(ge=0, le=1)] = 0.0
+    """Of a joint with play: normal rate after an impact over that before [1]."""
+    tangential_restitution: Annotated[float, Field(ge=0, le=1)] = 0.0
+    """Of a joint with play: slip rate after an impact that lets the surfaces stick over that before, reversed [1]."""
+    mu_static: NonNegative | None = None
+    """Of a joint with play: coefficient of the limit of stick [1]; by default `mu`."""
+    law: ContactLaw | None = None
+    """Of a joint with play: force of surfaces that give way, in place of rigid ones with a restitution."""
+
+    @model_validator(mode="after")
+    def _of_play(self) -> Clearance:
+        stated = {name: getattr(self, name) for name in Clearance.model_fields if name not in Tie.model_fields}
+        if stated.pop("play") is None:
+            for name, value in stated.items():
+                if value is not None and np.any(value):
+                    raise ValueError(f"{name}: is of a joint with play; state `play` as well, or leave it out")
+        elif self.law is not None and (np.any(self.restitution) or np.any(self.tangential_restitution)):
+            raise ValueError("restitution: is of rigid surfaces; state that of the law")
+        return self
+
+
 class Resisted(Tie):
     """A joint with one free motion that resists its rate: a rotation [rad/s] or a displacement [m/s]."""
 
@@ -114,7 +141,7 @@ class Resisted(Tie):
             # A default that is stated as well is no contradiction: scenes are written with all of their fields.
             if np.any(self.coulomb_speed != type(self).model_fields["coulomb_speed"].default):
                 raise ValueError("coulomb_speed: smooths friction, and stick: exact does not; leave one of them out")
-            if np.any(self.mu):
+            if np.any(self.share):
                 raise ValueError("mu: is smoothed; stick: exact is of a given friction, `coulomb`")
             if not np.any(self.coulomb):
                 raise ValueError("stick: exact is of dry friction; state `coulomb`")
@@ -128,7 +155,7 @@ class Resisted(Tie):
     @property
     def dry(self) -> bool:
         """Return whether it has dry friction of either kind."""
-        return bool(self.coulomb or self.mu)
+        return bool(self.coulomb or self.share)
 
     @property
     def resists(self) -> bool:
@@ -142,8 +169,11 @@ class Resisted(Tie):
         return np.asarray((self.friction + self.drag * np.abs(rate)) * rate + smoothed)
 
 
-class Revolute(Resisted):
-    """Two places stay together; the bodies turn freely but for friction."""
+class Revolute(Resisted, Clearance):
+    """Two places stay together; the bodies turn freely but for friction.
+
+    With play the first body has a pin, the second a hole that is wider by it; friction by mu is not smoothed.
+    """
 
     kind: Literal["revolute"] = "revolute"
     turned: ClassVar[tuple[str, ...]] = ()
@@ -154,21 +184,34 @@ class Revolute(Resisted):
 
     @model_validator(mode="after")
     def _pin_is_defined(self) -> Revolute:
-        if self.mu and self.radius is None:
+        if np.any(self.mu) and self.radius is None:
             raise ValueError("radius is missing; friction by mu acts at the radius of the pin (m)")
         return self
 
     @property
     def share(self) -> float:
-        """Torque of the friction by mu per force of the joint [m]."""
-        return self.mu * self.radius if self.radius is not None else 0.0
+        """Torque of the smoothed friction by mu per force of the joint [m]."""
+        return self.mu * self.radius if self.radius is not None and self.play is None else 0.0
 
 
-class Spherical(Tie):
-    """Two places stay together; the bodies turn freely about any axis. In space only."""
+class Spherical(Clearance):
+    """Two places stay together; the bodies turn freely about any axis. In space only.
+
+    With play the first body has a ball, the second a socket that is wider by it.
+    """
 
     kind: Literal["spherical"] = "spherical"
     turned: ClassVar[tuple[str, ...]] = ()
+    radius: Positive | None = None
+    """Radius of the ball of a joint with play, at which friction acts [m]."""
+    mu: NonNegative = 0.0
+    """Of a joint with play: coefficient of friction by Coulomb's law [1]."""
+
+    @model_validator(mode="after")
+    def _ball_is_defined(self) -> Spherical:
+        if np.any(self.mu) and (self.radius is None or self.play is None):
+            raise ValueError("mu: is of a ball with play; state `radius` and `play` as well, or leave it out")
+        return self
 
 
 class Universal(Tie):
@@ -227,10 +270,11 @@ class Weld(Tie):
     """Relative angle [rad]; by default that of the start."""
 
 
-class Slider(Resisted):
+class Slider(Resisted, Clearance):
     """The second place moves on a line through the first one, fixed to the first body.
 
-    Friction by mu is in proportion to the force across the line.
+    Friction by mu is in proportion to the force across the line. With play a box about the second place, its length
+    along the x axis of the second body, is between two lines of the first body; friction by mu is not smoothed.
     """
 
     kind: Literal["slider"] = "slider"
@@ -241,6 +285,21 @@ class Slider(Resisted):
     """Direction of the line in space, as it points at the start, in place of `direction` [1]."""
     rotation: Literal["free", "locked"] = "free"
     """Whether the second body may turn against the first."""
+    size: tuple[Positive, Positive] | None = None
+    """Of a slider with play: length and height of its box [m]."""
+
+    @property
+    def share(self) -> float:
+        """Smoothed friction by mu per force of the joint [1]."""
+        return self.mu if self.play is None else 0.0
+
+    @model_validator(mode="after")
+    def _has_a_box(self) -> Slider:
+        if (self.play is None) != (self.size is None):
+            raise ValueError(f"{'play' if self.play is None else 'size'} is missing; a guide with play needs both")
+        if self.play is not None and self.rotation == "locked":
+            raise ValueError("rotation: locked leaves no turn, which play does; leave one of them out")
+        return self
 
 
 class Distance(Tie):

@@ -16,6 +16,7 @@ from shoal.errors import InputError
 from shoal.scene import joints as joint_types
 from shoal.scene.amplitudes import check_amplitudes, check_place
 from shoal.scene.bodies import FRAMED, Body, Rod
+from shoal.scene.clearances import check_clearances, contacts_of
 from shoal.scene.contacts import Contact, check_contacts
 from shoal.scene.dimensions import Dimensions, check_dimensions, padded
 from shoal.scene.ended import End
@@ -158,7 +159,8 @@ class Scene(Record):
             check_amplitudes(name, self.bodies[name], self.initial[name])
         self._check_directions()
         check_dimensions(self)
-        check_contacts(self)
+        check_clearances(self)
+        check_contacts(self, contacts_of(self))
         placed = self._placed()
         loose = [name for name in self.bodies if name not in placed]
         if loose:

@@ -41,6 +41,8 @@ def require_counterparts(scene: Scene, *, stops: bool = False) -> None:
     for name in scene.contacts:
         raise InputError(f"contacts.{name}: not written as MJCF; there contacts give way, and its friction creeps")
     for name, joint in scene.joints.items():
+        if getattr(joint, "play", None) is not None:
+            raise InputError(f"joints.{name}.play: not written as MJCF; there contacts give way, and friction creeps")
         if joint.kind == "gear":
             raise InputError(f"joints.{name}: a gear is not written as MJCF; there its teeth would give way")
         if not isinstance(joint, JOINTS):

@@ -19,6 +19,7 @@ from shoal.mechanics.numerics.tile import Number, index, stacked
 from shoal.mechanics.pairs import FLAT, HOLE, ROUND, Pairs
 from shoal.mechanics.reach import span
 from shoal.scene import GROUND, Contact, ContactSurface, Distance, PointMass, Revolute, Scene, Slider
+from shoal.scene.clearances import contacts_of
 
 RESOLUTION = 1e-12
 """Gaps below this part of the machine's size, or below it in rad, are closed: a thousand times round-off."""
@@ -53,8 +54,8 @@ class Contacts(Measures):
         for name, joint in scene.joints.items():
             if isinstance(joint, Revolute | Slider) and joint.stick == "exact":
                 self._dry(name, joint)
-        for name, contact in scene.contacts.items():
-            self._pair(name, contact)
+        for path, contact in contacts_of(scene).items():
+            self._pair(path, contact)
 
     def gaps(self) -> Gaps:
         """Return the contacts as arrays."""
@@ -149,8 +150,8 @@ class Contacts(Measures):
         sign = UPPER if joint.keeps == "at-most" else LOWER
         self._limit(f"joints.{name}.keeps", "", start, sign, limit, joint.restitution)
 
-    def _pair(self, name: str, contact: Contact) -> None:
-        """Let two surfaces touch."""
+    def _pair(self, path: str, contact: Contact) -> None:
+        """Let two surfaces touch. path: of what states the contact."""
         first, second = contact.first, contact.second
         places = [self.placement.point(self.scene, side) for side in (first, second)]
         shape = {"hole": HOLE, "round": ROUND}.get(second.shape, FLAT)
@@ -170,15 +171,13 @@ class Contacts(Measures):
         )
         static = contact.mu if contact.mu_static is None else contact.mu_static
         self._add(
-            f"contacts.{name}", PAIR, len(self._pairs) - 1, 1.0, restitution=contact.restitution,
+            path, PAIR, len(self._pairs) - 1, 1.0, restitution=contact.restitution,
             tangential=contact.tangential_restitution, mu=contact.mu, mu_static=static, rolls=contact.rolling,
             law=None if contact.law is None else contact.law.numbers,
         )  # fmt: skip
         flat = None if first.axis is None else axle
         if contact.law is None:
-            self._check(
-                f"contacts.{name}", self._start_gap(shape, places, normal, flat, first.radius, reach), 0.0, LOWER
-            )
+            self._check(path, self._start_gap(shape, places, normal, flat, first.radius, reach), 0.0, LOWER)
 
     def _directors(self, side: ContactSurface) -> list[Affine]:
         """Return vectors that turn with a body; none for the ground, point masses, and rods, which touch at a point."""

@@ -19,11 +19,13 @@ from shoal.mechanics.affine import Affine
 from shoal.mechanics.frames import Frame, ModalFrame, RigidFrame
 from shoal.mechanics.joints import Meet, of_scene
 from shoal.mechanics.numerics.tile import Array, Flags, Number
+from shoal.mechanics.start.centred import centred
 from shoal.mechanics.start.closure import Rows
 from shoal.mechanics.start.poses import ROUNDING, Assembly, Statement
 from shoal.mechanics.start.rates import Velocities
 from shoal.mechanics.start.strained import gives_way, numbers_of_start, require_numbers
 from shoal.scene import GROUND, InitialState, Scene
+from shoal.scene.clearances import with_play
 from shoal.scene.ended import End
 from shoal.scene.initial import ABOUT_Z, POSES, RATES, UNITS, Quantity
 from shoal.scene.joints import places
@@ -53,7 +55,8 @@ def complete(scene: Scene) -> Start:
     """Return the start with every quantity of every body."""
     count = lanes_of((scene.initial, scene.bodies, scene.joints))
     lanes = max(count, 1)
-    assembly = Assembly(scene, lanes)
+    placed_as, moved_as = centred(scene, lanes)
+    assembly = Assembly(placed_as, lanes)
     placed = assembly.run()
     if not np.all(placed.ok) and gives_way(scene):
         if not count:
@@ -62,12 +65,13 @@ def complete(scene: Scene) -> Start:
             placed = placed._replace(ok=np.ones_like(placed.ok))
     if not count and not placed.ok[0]:
         raise pose_refused(assembly)
-    velocities = Velocities(assembly, placed.poses)
+    moved_by = assembly if moved_as is placed_as else Assembly(moved_as, lanes)
+    velocities = Velocities(moved_by, placed.poses)
     moving = velocities.run()
     if not count and not moving.ok[0]:
         # The other ways to put the machine together may have the stated rates.
         for other in assembly.others(placed.poses):
-            tried = Velocities(assembly, other).run()
+            tried = Velocities(moved_by, other).run()
             if tried.ok[0]:
                 placed, moving = placed._replace(poses=other), tried
                 break
@@ -104,6 +108,8 @@ def gives_numbers(scene: Scene) -> bool:
 def is_direct(scene: Scene) -> bool:
     """Return whether the walk along the joints keeps every statement: open chains of revolute joints in the plane."""
     if scene.ground_points or scene.dimensions == 3 or any(start.mode_rates for start in scene.initial.values()):
+        return False
+    if with_play(scene):
         return False
     group = {name: name for name in (GROUND, *scene.bodies)}
     for _, condition in of_scene(scene):
