@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from shoal.scene.contacts import Contact, ContactSurface
 from shoal.scene.joints import Clearance, Slider
 
-if TYPE_CHECKING:
-    from shoal.scene.scene import Scene
 
-
-def with_play(scene: Scene) -> dict[str, Clearance]:
+def with_play(scene: Any) -> dict[str, Clearance]:
     """Return the joints that have play, by name."""
     return {name: one for name, one in scene.joints.items() if isinstance(one, Clearance) and one.play is not None}
 
 
-def contacts_of(scene: Scene) -> dict[str, Contact]:
+def contacts_of(scene: Any) -> dict[str, Contact]:
     """Return all contacts of a scene by the path of what states them: first those of joints with play."""
     found = {}
     for name, joint in with_play(scene).items():
@@ -54,7 +51,7 @@ def _pin(joint: Any) -> Iterator[tuple[ContactSurface, ContactSurface]]:
     )
 
 
-def _guide(scene: Scene, joint: Slider) -> Iterator[tuple[ContactSurface, ContactSurface]]:
+def _guide(scene: Any, joint: Slider) -> Iterator[tuple[ContactSurface, ContactSurface]]:
     """Yield the corners of the box: those in front and behind at the line on the left, then those on the right."""
     assert joint.size is not None
     assert joint.play is not None
@@ -69,7 +66,7 @@ def _guide(scene: Scene, joint: Slider) -> Iterator[tuple[ContactSurface, Contac
             yield _surface(joint.second.body, corner), _surface(joint.first.body, place, line=line)
 
 
-def check_clearances(scene: Scene) -> None:
+def check_clearances(scene: Any) -> None:
     """Raises ValueError where a joint cannot have play in the dimensions of a scene, or between its bodies."""
     for name, joint in with_play(scene).items():
         where = f"joints.{name}"
