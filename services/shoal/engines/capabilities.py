@@ -38,6 +38,7 @@ FEATURES = (
     "exact stick",
     "contacts",
     "play",
+    "backlash",
 )
 _FIELDS = {
     "coulomb": "dry friction",
@@ -45,6 +46,7 @@ _FIELDS = {
     "mu": "friction by joint forces",
     "stops": "stops",
     "play": "play",
+    "backlash": "backlash",
     "first_to": "angles of places",
     "second_to": "angles of places",
 }

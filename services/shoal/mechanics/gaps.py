@@ -32,9 +32,10 @@ HIT, LIFT, SLIDE, STOP = 1.0, -1.0, 2.0, 3.0
 class Gaps(NamedTuple):
     """Contacts of one tile.
 
-    tangents: slip directions of each, 0 where none rubs. kind, number: what it is, and its number among the measures or
-    the pairs. rubs: whether it has friction. rolls: whether it sticks whatever the force. measures: what is limited,
-    with the limit for its natural value, or slips. sign: 1 of a lower limit and of friction, -1 of an upper limit.
+    tangents: slip directions of each, 0 where none rubs. kind, number: what it is, and its number among the pairs, or
+    that of the first of its measures; last: that after the last of them. rubs: whether it has friction. rolls: whether
+    it sticks whatever the force. measures: what is limited, less the limit as their natural values, or slips; weight:
+    of each in the sum that is a gap, (measures, lanes), so 1 of a lower limit and of friction, -1 of an upper limit.
     restitution, tangential: rate after an impact over the rate before, with the opposite sign (Newton), along the
     normal and of stick. mu, mu_static: coefficients of friction in slip and of the limit of stick; given: friction that
     no normal force causes [N or N m]. The last six are (contacts, lanes). soft: RIGID, or that the force along the
@@ -46,11 +47,12 @@ class Gaps(NamedTuple):
     tangents: int
     kind: Index
     number: Index
+    last: Index
     rubs: Index
     rolls: Index
     measures: Forces
     pairs: Pairs
-    sign: Array
+    weight: Array
     restitution: Array
     tangential: Array
     mu: Array
@@ -146,7 +148,7 @@ def shifted(gaps: Gaps, shifts: Mapping[int, float]) -> Gaps:
         if gaps.kind[contact] == PAIR:
             radius[number] += shift
         else:
-            law[LAW * number + NATURAL] += gaps.sign[contact] * shift
+            law[LAW * number + NATURAL] += shift / gaps.weight[number]
     return gaps._replace(measures=gaps.measures._replace(law=law), pairs=gaps.pairs._replace(radius=radius))
 
 
@@ -164,18 +166,21 @@ def look(tile: Tile, gaps: Gaps, z: Array, zdot: Array, g: GapWork, room: Array)
             for lane in range(width):
                 _look_at_pair(gaps, contact, width, lane, z, zdot, g)
         else:
-            forces.measure(tile, gaps.measures, number, z, g.memory, room)
-            forces.slip(tile, gaps.measures, number, zdot, room)
-            for lane in range(width):
-                at = contact * width + lane
-                rate = gaps.sign[at] * room[value + width + lane]
+            for at in range(contact * width, (contact + 1) * width):
                 g.value[at], g.rate[at] = 0.0, 0.0
-                if kind == DRY:
-                    g.value[at] = room[value + lane] - g.anchor[at]
-                    g.slip[(contact * ways + 1) * width + lane] = rate
+            for part in range(number, gaps.last[contact]):
+                forces.measure(tile, gaps.measures, part, z, g.memory, room)
+                forces.slip(tile, gaps.measures, part, zdot, room)
+                for lane in range(width):
+                    at, weight = contact * width + lane, gaps.weight[part * width + lane]
+                    g.value[at] += weight * room[value + lane]
+                    g.rate[at] += weight * room[value + width + lane]
+            if kind == DRY:
+                for lane in range(width):
+                    at = contact * width + lane
+                    g.value[at] -= g.anchor[at]
+                    g.slip[(contact * ways + 1) * width + lane], g.rate[at] = g.rate[at], 0.0
                     g.axes[(9 * contact + 3) * width + lane] = 1.0
-                else:
-                    g.value[at], g.rate[at] = gaps.sign[at] * room[value + lane], rate
         if gaps.rubs[contact] > 0:
             for lane in range(width):
                 if g.mode[contact * width + lane] == SLIP:
@@ -241,15 +246,18 @@ def add_unit(tile: Tile, gaps: Gaps, contact: int, way: int, z: Array, zdot: Arr
             for k in range(rows):
                 g.unit[gaps.pairs.rows[rows * number + k] * width + lane] += g.pair[begin + k]
         return
-    rows = 3 * d
-    forces.measure(tile, gaps.measures, number, z, g.memory, room)
-    for k in range(rows):
-        row = gaps.measures.rows[rows * number + k]
-        for lane in range(width):
-            g.unit[row * width + lane] += gaps.sign[contact * width + lane] * room[(rows + k) * width + lane]
+    rows, bias = 3 * d, (contact * ways + way) * width
     for lane in range(width):
-        sign = gaps.sign[contact * width + lane]
-        g.bias[(contact * ways + way) * width + lane] = sign * _bias(tile, gaps.measures, number, lane, z, zdot)
+        g.bias[bias + lane] = 0.0
+    for part in range(number, gaps.last[contact]):
+        forces.measure(tile, gaps.measures, part, z, g.memory, room)
+        for k in range(rows):
+            row = gaps.measures.rows[rows * part + k]
+            for lane in range(width):
+                g.unit[row * width + lane] += gaps.weight[part * width + lane] * room[(rows + k) * width + lane]
+        for lane in range(width):
+            weight = gaps.weight[part * width + lane]
+            g.bias[bias + lane] += weight * _bias(tile, gaps.measures, part, lane, z, zdot)
 
 
 @njit(cache=True, error_model="numpy")

@@ -19,7 +19,6 @@ from shoal.scene import Function, Scene
 from shoal.scene.joints import (
     GROUND,
     Attachment,
-    Clearance,
     CoupledCoordinate,
     Coupling,
     Cylindrical,
@@ -34,6 +33,7 @@ from shoal.scene.joints import (
     Spherical,
     Universal,
     Weld,
+    is_loose,
 )
 from shoal.scene.record import Vector3
 
@@ -388,8 +388,8 @@ def conditions(joint: Any, dimensions: int = 2) -> list[Any]:
         if type(joint) in other:
             raise InputError(f"joints: {joint.kind!r} is no joint of scenes with {dimensions} dimensions")
         raise NotImplementedError(f"the mechanics knows no conditions of a joint of kind {joint.kind!r}")
-    if isinstance(joint, Clearance) and joint.play is not None:
-        return []  # contacts hold it, see `scene.clearances`
+    if is_loose(joint):
+        return []  # contacts hold it, see `assembly.contacts`
     return table[type(joint)](joint)
 
 

@@ -17,7 +17,7 @@ from shoal.pictures.style import BLACK, GREEN, ORANGE, PURPLE, VERMILION
 from shoal.scene import GROUND, Attachment, Revolute, Rod, Scene, Slider
 from shoal.scene.clearances import contacts_of, with_play
 from shoal.scene.contacts import ContactSurface
-from shoal.scene.joints import Distance, places
+from shoal.scene.joints import Distance, is_loose, places
 from shoal.trajectory import Array
 
 KINDS: dict[str, dict[str, Any]] = {
@@ -61,13 +61,13 @@ def struck(scene: Scene, events: Sequence[Event]) -> dict[str, Array]:
     """Return the times [s] at which impacts may change the rates of markers, by name.
 
     They are impacts of bodies that joints connect with that of the marker. Ropes, struts, contacts and joints with play
-    connect none.
+    or backlash connect none.
     """
     sides = {name: [side.body for side in places(joint)] for name, joint in scene.joints.items()}
     touching = {name: [contact.first.body, contact.second.body] for name, contact in scene.contacts.items()}
     group = {name: name for name in scene.bodies}
     for name, bodies in sides.items():
-        if getattr(scene.joints[name], "keeps", "exactly") == "exactly" and name not in with_play(scene):
+        if getattr(scene.joints[name], "keeps", "exactly") == "exactly" and not is_loose(scene.joints[name]):
             roots = {group[body] for body in bodies if body != GROUND}
             group = {key: min(roots) if root in roots else root for key, root in group.items()}
     groups = {name: {group.get(body) for body in bodies} for name, bodies in (sides | touching).items()}

@@ -67,7 +67,13 @@ def _guide(scene: Any, joint: Slider) -> Iterator[tuple[ContactSurface, ContactS
 
 
 def check_clearances(scene: Any) -> None:
-    """Raises ValueError where a joint cannot have play in the dimensions of a scene, or between its bodies."""
+    """Raises ValueError where a joint cannot have play or backlash in a scene, or between its bodies."""
+    for name, joint in scene.joints.items():
+        for field in joint.turned if getattr(joint, "backlash", None) is not None else ():
+            body = scene.bodies.get(getattr(joint, field).body)
+            if body is not None and body.element != "rigid":
+                on = getattr(joint, field).body
+                raise ValueError(f"joints.{name}.{field}.body: gears with backlash are on rigid bodies, found {on}")
     for name, joint in with_play(scene).items():
         where = f"joints.{name}"
         if scene.dimensions == 3 and joint.kind != "spherical":

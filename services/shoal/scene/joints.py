@@ -366,10 +366,26 @@ def _fraction(value: Any) -> Any:
     return value
 
 
-class Gear(DirectionTie):
+class Slack(Record):
+    """A sum that a joint keeps, or that may vary by its backlash and strikes both ends of that."""
+
+    backlash: Positive | None = None
+    """Range in which the sum is free about its value at the start; by default it has none."""
+    restitution: Annotated[float, Field(ge=0, le=1)] = 0.0
+    """Of a joint with backlash: rate of the sum after an impact over that before [1]."""
+
+    @model_validator(mode="after")
+    def _of_backlash(self) -> Slack:
+        if self.backlash is None and np.any(self.restitution):
+            raise ValueError("restitution: is of a joint with backlash; state `backlash` as well, or leave it out")
+        return self
+
+
+class Gear(DirectionTie, Slack):
     """Gears, a belt or a chain: the second body turns `ratio` times as fast as the first, as seen from a carrier.
 
-    Both axes keep their direction; where they differ, as those of bevel and worm gears, the ground carries them.
+    Both axes keep their direction; where they differ, as those of bevel and worm gears, the ground carries them. Its
+    backlash [rad] is the angle by which the second body can turn while the others rest.
     """
 
     kind: Literal["gear"] = "gear"
@@ -425,8 +441,8 @@ class CoupledCoordinate(Record):
     """Its factor [1]."""
 
 
-class Coupling(Record):
-    """The sum of factor * coordinate is a function of time."""
+class Coupling(Slack):
+    """The sum of factor * coordinate is a function of time, or free by its backlash [m] about that of the start."""
 
     kind: Literal["coupling"] = "coupling"
     turned: ClassVar[tuple[str, ...]] = ()
@@ -434,6 +450,12 @@ class Coupling(Record):
     """Coordinates with their factors."""
     value: Function = Function(number=0.0)
     """The sum [m] as a function of time."""
+
+    @model_validator(mode="after")
+    def _slack_about_start(self) -> Coupling:
+        if self.backlash is not None and self.value.number != 0.0:
+            raise ValueError("value: with backlash the sum is free about its value at the start; leave one of them out")
+        return self
 
 
 def _revolute_if_unsaid(data: Any) -> Any:
@@ -461,6 +483,17 @@ Joint = Annotated[
 ]
 """A joint without a kind is a revolute one."""
 JOINT_KINDS = kinds(Joint)
+
+
+def is_loose(joint: Any) -> bool:
+    """Return whether a joint has play or backlash, so that contacts hold it in place of equations."""
+    return getattr(joint, "play", None) is not None or getattr(joint, "backlash", None) is not None
+
+
+def tightened(joint: Any) -> Any:
+    """Return a joint without its play or backlash."""
+    without = {"play": None, "size": None, "backlash": None}
+    return joint.model_copy(update={name: value for name, value in without.items() if name in type(joint).model_fields})
 
 
 def sides(record: Record) -> dict[str, Attachment]:

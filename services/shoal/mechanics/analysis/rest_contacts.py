@@ -40,13 +40,17 @@ class RestContacts:
         self._measures = Forces(measured.dimensions, measured.size + of_pairs.size, *joined)
         kept = np.flatnonzero(gaps.kind != DRY)
         self.size = len(kept)
-        is_pair = gaps.kind[kept] == PAIR
-        self._number = gaps.number[kept] + measured.size * is_pair
-        holes = gaps.pairs.shape[gaps.number[kept] * is_pair] == HOLE if gaps.pairs.size else np.zeros(len(kept), bool)
-        self._sign = np.where(is_pair, np.where(holes, -1.0, 1.0), gaps.sign[kept])
+        weight = np.append(gaps.weight, np.where(gaps.pairs.shape == HOLE, -1.0, 1.0))
+        parts = [
+            np.arange(number, last) if kind != PAIR else np.array([measured.size + number])
+            for kind, number, last in zip(gaps.kind[kept], gaps.number[kept], gaps.last[kept], strict=True)
+        ]
+        where = np.repeat(np.arange(self.size), [len(part) for part in parts]), np.concatenate([*parts, kept[:0]])
+        self._sums = scipy.sparse.csr_array((weight[where[1]], where), shape=(self.size, self._measures.size))
+        """Weights of the measures in every gap, (gaps, measures)."""
         self.names = tuple(
-            f"{name}.{'min' if sign > 0 else 'max'}" if name.endswith(".stops") else name
-            for name, sign in zip([model.gap_fields[k] for k in kept], self._sign, strict=True)
+            f"{field}.{'min' if weight[part[0]] > 0 else 'max'}" if field.endswith(".stops") else field
+            for field, part in zip([model.gap_fields[k] for k in kept], parts, strict=True)
         )
         if self.size:
             intended = np.append(model.gap_angles[:, 0], np.zeros(of_pairs.size))
@@ -76,8 +80,7 @@ class RestContacts:
         values, gradients = self._measured(z)
         where = np.repeat(np.arange(len(values)), side), self._measures.rows
         block = scipy.sparse.csr_array((gradients.ravel(), where), shape=(len(values), len(z)))
-        rows = scipy.sparse.diags_array(self._sign) @ (block @ self._evaluator.expansion)[self._number]
-        return self._sign * values[self._number], scipy.sparse.csr_array(rows)
+        return self._sums @ values, scipy.sparse.csr_array(self._sums @ block @ self._evaluator.expansion)
 
     def curvature(self, q: Array, numbers: Index, multipliers: Array) -> scipy.sparse.csc_array:
         """Return the sum of multipliers times second derivatives of some gaps, (unknowns, unknowns)."""
@@ -87,8 +90,7 @@ class RestContacts:
         # d2U/dz2 = k g_q g_q' + k x g_qq of springs whose x is 1, and 0.
         strained, relaxed = (self._stiffness(z, natural - x) for x in (1.0, 0.0))
         blocks = (strained - relaxed).reshape(len(values), side, side)
-        weight = np.zeros(len(values))
-        np.add.at(weight, self._number[numbers], multipliers * self._sign[numbers])
+        weight = self._sums[numbers].T @ multipliers
         rows = self._measures.rows.reshape(len(values), side)
         where = np.repeat(rows, side, axis=1).ravel(), np.tile(rows, side).ravel()
         entries = (weight[:, None, None] * blocks).ravel()

@@ -1,25 +1,40 @@
-"""Contacts of a scene: stops of hinges and sliders, ropes and struts, dry friction that sticks, pairs of surfaces."""
+"""Contacts of a scene: stops, ropes and struts, backlash, dry friction that sticks, and pairs of surfaces."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from shoal.errors import InputError
-from shoal.mechanics.affine import Affine
+from shoal.mechanics.affine import Affine, fixed
 from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.assembly.loads import ElementForceLaw, Measures
 from shoal.mechanics.derived import RowAllocator
-from shoal.mechanics.forces import DISTANCE, PLACE
+from shoal.mechanics.forces import DISTANCE, LAW, NATURAL, PLACE
 from shoal.mechanics.frames import RigidFrame
 from shoal.mechanics.gaps import DRY, GIVES, LAW_SIZE, LIMIT, PAIR, RIGID, Gaps
+from shoal.mechanics.joints import conditions
 from shoal.mechanics.numerics.tile import Number, index, stacked
 from shoal.mechanics.pairs import FLAT, HOLE, ROUND, Pairs
 from shoal.mechanics.reach import span
-from shoal.scene import GROUND, Contact, ContactSurface, Distance, PointMass, Revolute, Scene, Slider
+from shoal.scene import (
+    GROUND,
+    Attachment,
+    Contact,
+    ContactSurface,
+    Coupling,
+    Distance,
+    Gear,
+    PointMass,
+    Revolute,
+    Scene,
+    Slider,
+)
 from shoal.scene.clearances import contacts_of
+from shoal.scene.joints import tightened
 
 RESOLUTION = 1e-12
 """Gaps below this part of the machine's size, or below it in rad, are closed: a thousand times round-off."""
@@ -37,10 +52,12 @@ class Contacts(Measures):
         """Which lanes start beyond a limit, (lanes,) or (1,)."""
         self.fields: list[str] = []
         """What states each contact."""
-        self._each: list[tuple[int, int]] = []
-        """Kind and number of each contact."""
+        self._each: list[tuple[int, int, int]] = []
+        """Kind, number and number after the last of its measures of each contact."""
+        self._weights: list[Number] = []
+        """Of the measures in the gaps."""
         self._numbers: list[tuple[Number, ...]] = []
-        """Sign, restitution, tangential restitution, mu, mu_static and given friction of each contact."""
+        """Restitution, tangential restitution, mu, mu_static and given friction of each contact."""
         self._rolls: list[bool] = []
         self._laws: list[tuple[int, tuple[Number, ...]]] = []
         """Whether a contact gives way, and the numbers of its law."""
@@ -51,6 +68,8 @@ class Contacts(Measures):
                 self._stops(name, joint)
             elif isinstance(joint, Distance) and joint.keeps != "exactly":
                 self._rope(name, joint)
+            elif isinstance(joint, Gear | Coupling) and joint.backlash is not None:
+                self._backlash(name, joint)
         for name, joint in scene.joints.items():
             if isinstance(joint, Revolute | Slider) and joint.stick == "exact":
                 self._dry(name, joint)
@@ -65,18 +84,19 @@ class Contacts(Measures):
             self.scene.dimensions, len(self._pairs), index(shapes), index(discs),
             index(turns).ravel(), index(rows).ravel(), stacked(radii), stacked(reaches),
         )  # fmt: skip
-        numbers = tuple(zip(*self._numbers, strict=True)) if size else ((),) * 6
-        sign, restitution, tangential, mu, mu_static, given = (stacked(part) for part in numbers)
+        numbers = tuple(zip(*self._numbers, strict=True)) if size else ((),) * 5
+        restitution, tangential, mu, mu_static, given = (stacked(part) for part in numbers)
         return Gaps(
             size,
             self.scene.dimensions - 1 if any(rubs) else 0,
-            index([kind for kind, _ in self._each]),
-            index([number for _, number in self._each]),
+            index([kind for kind, _, _ in self._each]),
+            index([number for _, number, _ in self._each]),
+            index([last for _, _, last in self._each]),
             index(rubs),
             index(self._rolls),
             self.forces(),
             pairs,
-            sign,
+            stacked(self._weights),
             restitution,
             tangential,
             mu,
@@ -88,22 +108,24 @@ class Contacts(Measures):
         )
 
     def _is_rough(self, k: int) -> bool:
-        return self._each[k][0] == DRY or self._rolls[k] or bool(np.any(self._numbers[k][4]))
+        return self._each[k][0] == DRY or self._rolls[k] or bool(np.any(self._numbers[k][3]))
 
     def _add(
-        self, field: str, kind: int, number: int, sign: float, *, restitution: Number = 0.0,
+        self, field: str, kind: int, number: int, weights: Sequence[Number] = (), *, restitution: Number = 0.0,
         tangential: Number = 0.0, mu: Number = 0.0, mu_static: Number = 0.0, given: Number = 0.0, rolls: bool = False,
         law: tuple[Number, ...] | None = None,
     ) -> None:  # fmt: skip
+        """Add a contact. weights: of its measures, the last ones, in its gap."""
         self.fields.append(field)
-        self._each.append((kind, number))
-        self._numbers.append((sign, restitution, tangential, mu, mu_static, given))
+        self._each.append((kind, number, number + len(weights)))
+        self._weights += weights
+        self._numbers.append((restitution, tangential, mu, mu_static, given))
         self._rolls.append(rolls)
         self._laws.append((RIGID, (0.0,) * LAW_SIZE) if law is None else (GIVES, law))
 
     def _limit(self, field: str, side: str, place: Number, sign: float, limit: Number, restitution: Number) -> None:
         """Limit the last measure on one side; place: where it is at the start [rad or m]."""
-        self._add(field, LIMIT, len(self.kinds) - 1, sign, restitution=restitution)
+        self._add(field, LIMIT, len(self.kinds) - 1, [sign], restitution=restitution)
         where = ".".join(filter(None, (field, side)))
         self._check(where, place, limit, sign)
 
@@ -126,7 +148,7 @@ class Contacts(Measures):
     def _dry(self, name: str, joint: Revolute | Slider) -> None:
         """Let a joint stick by dry friction of a given force."""
         self._free_motion(name, joint, 0.0)
-        self._add(f"joints.{name}.coulomb", DRY, len(self.kinds) - 1, 1.0, mu_static=1.0, given=joint.coulomb)
+        self._add(f"joints.{name}.coulomb", DRY, len(self.kinds) - 1, [1.0], mu_static=1.0, given=joint.coulomb)
 
     def _free_motion(self, name: str, joint: Revolute | Slider, limit: Number) -> Number:
         """Measure the free motion of a joint; returns where it is at the start [rad or m]."""
@@ -150,6 +172,37 @@ class Contacts(Measures):
         sign = UPPER if joint.keeps == "at-most" else LOWER
         self._limit(f"joints.{name}.keeps", "", start, sign, limit, joint.restitution)
 
+    def _backlash(self, name: str, joint: Gear | Coupling) -> None:
+        """Limit the sum that a gear or a coupling keeps to both sides of what it is at the start."""
+        assert joint.backlash is not None
+        for sign in (LOWER, UPPER):
+            first = len(self.kinds)
+            factors = self._turns(name, joint) if isinstance(joint, Gear) else self._coordinates(name, joint)
+            self.laws[LAW * first + NATURAL] += -0.5 * sign * joint.backlash / factors[0]
+            weights = [sign * factor for factor in factors]
+            self._add(f"joints.{name}.backlash", LIMIT, first, weights, restitution=joint.restitution)
+
+    def _turns(self, name: str, joint: Gear) -> list[Number]:
+        """Measure the angles of gears from where they start; return their factors, 1 for the second body."""
+        (condition,) = conditions(tightened(joint), self.scene.dimensions)
+        ground, factors = Attachment(body=GROUND, point=(0.0, 0.0)), []
+        for teeth, side, axis in zip(condition.teeth, condition.sides, condition.axes, strict=True):
+            if teeth and side.body != GROUND:
+                self.placement.angle(name, side, axis)  # refuses axes in space that move
+                self._angle(name, ground, side, ElementForceLaw(), axis)
+                self.laws[-LAW + NATURAL] = self.angles[-1]
+                factors.append(teeth / condition.teeth[0])
+        return factors
+
+    def _coordinates(self, name: str, joint: Coupling) -> list[Number]:
+        """Measure the coordinates of a coupling from where they start; return their factors."""
+        axes = np.eye(self.scene.dimensions)[..., None]
+        for term in joint.terms:
+            point, axis = self.placement.point(self.scene, term.at), axes["xyz".index(term.axis)]
+            begin = sum(self.placement.start_of(point)[0] * axis)
+            self._measure(name, PLACE, [fixed(0.0 * axis), point, fixed(axis)], ElementForceLaw(natural=begin), 0.0)
+        return [term.factor for term in joint.terms]
+
     def _pair(self, path: str, contact: Contact) -> None:
         """Let two surfaces touch. path: of what states the contact."""
         first, second = contact.first, contact.second
@@ -171,7 +224,7 @@ class Contacts(Measures):
         )
         static = contact.mu if contact.mu_static is None else contact.mu_static
         self._add(
-            path, PAIR, len(self._pairs) - 1, 1.0, restitution=contact.restitution,
+            path, PAIR, len(self._pairs) - 1, restitution=contact.restitution,
             tangential=contact.tangential_restitution, mu=contact.mu, mu_static=static, rolls=contact.rolling,
             law=None if contact.law is None else contact.law.numbers,
         )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Joints with play at the start: centred where neither the stated values nor the other joints tell where they are.
+"""Joints with play or backlash at the start: centred where neither stated values nor other joints tell their place.
 
 With N the directions that stated values and joints without play leave free, and J the rows that the joint would have
 without play, it is told where J N = 0.
@@ -13,8 +13,8 @@ import numpy as np
 from shoal.mechanics.numerics.tile import Array, Index
 from shoal.mechanics.start.poses import Assembly, stated
 from shoal.scene import Scene
-from shoal.scene.clearances import with_play
 from shoal.scene.initial import POSES, RATES, Quantity
+from shoal.scene.joints import is_loose, tightened
 
 FREE = 1e-6
 """Part of a row, of its own length, above which a direction that is left free moves it."""
@@ -22,7 +22,7 @@ FREE = 1e-6
 
 def centred(scene: Scene, lanes: int) -> tuple[Scene, Scene]:
     """Return a scene without play in the joints that are to start centred, of its poses, and the same of its rates."""
-    names = list(with_play(scene))
+    names = [name for name, joint in scene.joints.items() if is_loose(joint)]
     if not names:
         return scene, scene
     assembly = Assembly(_closed(scene, names), lanes)
@@ -64,5 +64,4 @@ def _outside(slope: Array, others: Index, mine: Array) -> Array:
 
 def _closed(scene: Scene, names: Iterable[str]) -> Scene:
     """Return a scene in which some joints have no play."""
-    closed = {name: scene.joints[name].model_copy(update={"play": None, "size": None}) for name in names}
-    return scene.model_copy(update={"joints": scene.joints | closed})
+    return scene.model_copy(update={"joints": scene.joints | {name: tightened(scene.joints[name]) for name in names}})

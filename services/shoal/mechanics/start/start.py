@@ -25,10 +25,9 @@ from shoal.mechanics.start.poses import ROUNDING, Assembly, Statement
 from shoal.mechanics.start.rates import Velocities
 from shoal.mechanics.start.strained import gives_way, numbers_of_start, require_numbers
 from shoal.scene import GROUND, InitialState, Scene
-from shoal.scene.clearances import with_play
 from shoal.scene.ended import End
 from shoal.scene.initial import ABOUT_Z, POSES, RATES, UNITS, Quantity
-from shoal.scene.joints import places
+from shoal.scene.joints import is_loose, places
 from shoal.scene.paths import lanes_of
 
 _EFFORT = 8_000
@@ -109,7 +108,7 @@ def is_direct(scene: Scene) -> bool:
     """Return whether the walk along the joints keeps every statement: open chains of revolute joints in the plane."""
     if scene.ground_points or scene.dimensions == 3 or any(start.mode_rates for start in scene.initial.values()):
         return False
-    if with_play(scene):
+    if any(map(is_loose, scene.joints.values())):
         return False
     group = {name: name for name in (GROUND, *scene.bodies)}
     for _, condition in of_scene(scene):
