@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import combinations
 from typing import Any
 
@@ -13,6 +13,7 @@ from shoal.arguments import told
 from shoal.engines import get_engine
 from shoal.engines.capabilities import able
 from shoal.engines.gauss import GaussEngine
+from shoal.engines.penalty import PenaltyStudy, study
 from shoal.engines.verification import verify as errors_of
 from shoal.engines.verification import with_errors
 from shoal.error_budget import ErrorBudget
@@ -29,13 +30,15 @@ COMPARED = ("gauss", "exudyn", "casadi", "tree")
 class Comparison:
     """Trajectories by engine; engines that cannot run the scene are in `refused` with their reason.
 
-    verified: the engine whose run was verified, ours where it ran; empty where none was
+    verified: the engine whose run was verified, ours where it ran; empty where none was; penalties: runs of engines
+    whose contacts give way, with stiffer ones
     """
 
     scene: Scene
     trajectories: dict[str, Trajectory]
     refused: dict[str, str]
     verified: str = ""
+    penalties: dict[str, PenaltyStudy] = field(default_factory=dict)
 
     @property
     def errors(self) -> ErrorBudget:
@@ -77,6 +80,10 @@ class Comparison:
                 )
         return rows
 
+    def compliance(self) -> dict[str, dict[str, Any]]:
+        """Return by engine whose contacts give way how far from the verified run it ends, see `PenaltyStudy.row`."""
+        return {name: one.row(self.trajectories[self.verified]) for name, one in self.penalties.items()}
+
     def to_json(self) -> dict[str, Any]:
         """The object that `shoal compare --json` prints."""
         return {
@@ -87,7 +94,7 @@ class Comparison:
             "error": plain(self.errors.total),
             "errors": self.errors.to_json(),
             "differences": self.differences(),
-        }
+        } | ({"compliance": self.compliance()} if self.penalties else {})
 
 
 def compared(scene: Scene) -> list[str]:
@@ -127,4 +134,6 @@ def compare(
     trajectories[looked_at] = with_errors(
         motion, errors_of(motion, scene, chosen[looked_at] if looked_at == native else None)
     )
-    return Comparison(scene, trajectories, refused, looked_at)
+    studies = {name: study(chosen[name], scene, trajectories[name]) for name in good if name != looked_at}
+    penalties = {name: one for name, one in studies.items() if one is not None}
+    return Comparison(scene, trajectories, refused, looked_at, penalties)

@@ -36,11 +36,11 @@ class ContactLaw(Record):
     @property
     def numbers(self) -> tuple[Any, ...]:
         """Return stiffness, exponent, damping, damping times the rate at which the contact is met, and viscosity."""
-        loss = 0.0 if self.restitution is None else np.vectorize(_loss)(self.restitution)
+        loss = 0.0 if self.restitution is None else np.vectorize(loss_of)(self.restitution)
         return self.stiffness, self.exponent, self.damping, loss, self.viscosity
 
 
-def _loss(e: float) -> float:
+def loss_of(e: float) -> float:
     """Return damping times the rate v before, x, for a restitution e: ln((1 + x) / (1 - e x)) = (1 + e) x.
 
     Of m d'' = -K d^n (1 + x d'/v): d' dd' / (1 + x d'/v) = -K d^n dd / m, integrated from v to -e v.
@@ -50,4 +50,10 @@ def _loss(e: float) -> float:
 
     if e >= 1.0:
         return 0.0
-    return float(brentq(lambda x: np.log1p(x) - np.log1p(-e * x) - (1.0 + e) * x, 1e-9, (1.0 - 1e-12) / e))
+
+    def rest(x: float) -> float:
+        return float(np.log1p(x) - np.log1p(-e * x) - (1.0 + e) * x)
+
+    # Of a small e the root is nearer to 1 / e than round-off.
+    top = (1.0 - 1e-12) / e
+    return top if rest(top) < 0.0 else float(brentq(rest, 1e-9, top))

@@ -96,6 +96,10 @@ class System:
         """A function that Exudyn calls: what `make`, of `user`, makes of numbers and functions."""
         return make(*given)
 
+    def vectors(self, given: Array) -> Any:
+        """Points (n, 3) as a list of Exudyn's."""
+        return self.items.exudyn.Vector3DList(given.tolist())
+
     def node(self, kind: str, begin: list[Any], rates: list[Any]) -> tuple[Any, list[int]]:
         """Enter a node with its coordinates at the start and their rates; its number and their columns."""
         columns = list(range(self.unknowns, self.unknowns + len(begin)))

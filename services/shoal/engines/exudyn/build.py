@@ -16,6 +16,7 @@ from shoal.engines.exudyn.beam import BeamPart
 from shoal.engines.exudyn.bodies import BodyPart, Holder, RigidPart, System
 from shoal.engines.exudyn.cable import CablePart
 from shoal.engines.exudyn.connectors import Exchange
+from shoal.engines.exudyn.contacts import Penalty, add_contacts
 from shoal.engines.exudyn.ends import SystemAttachments
 from shoal.engines.exudyn.ground import GroundPart, add_moving_point
 from shoal.engines.exudyn.joints import Gap, add_friction, add_joint
@@ -24,6 +25,7 @@ from shoal.engines.exudyn.record import Indices
 from shoal.engines.poses import initial_poses
 from shoal.errors import InputError
 from shoal.mechanics.assembly.groups import moving
+from shoal.mechanics.joints import conditions
 from shoal.mechanics.reach import span
 from shoal.mechanics.start.start import complete
 from shoal.scene import GROUND, DrivenAngle, Scene
@@ -72,6 +74,8 @@ class ExudynSystem:
     gaps: list[Gap]
     exchanges: list[Exchange]
     """Springs, friction and applied loads."""
+    penalties: dict[str, Penalty]
+    """Springs that stand for contacts, by their field."""
     span: float
     """Size of the machine [m]."""
     reference: Array
@@ -90,10 +94,12 @@ class ExudynSystem:
         return len(self.mbs.systemData.GetAECoordinates())
 
     @property
-    def driven(self) -> bool:
-        """Return whether motion is prescribed: then energy comes and goes through constraints, and is not followed."""
+    def unfollowed(self) -> str:
+        """Return why the energy is not followed: it comes and goes through constraints, or contacts take it."""
         joints = self.scene.joints.values()
-        return bool(self.scene.ground_points) or any(isinstance(joint, DrivenAngle) for joint in joints)
+        if self.scene.ground_points or any(isinstance(joint, DrivenAngle) for joint in joints):
+            return "motion is prescribed"
+        return "contacts take energy" if self.penalties else ""
 
     def gap(self, q: Array, v: Array) -> float:
         """Largest opening of a joint [m, or rad]; q, v: (rows, unknowns)."""
@@ -151,10 +157,13 @@ def build(
         system.enter(f"ground_points.{point}")
         places[name] = add_moving_point(system, ground, point, path, poses[name])
     ends = SystemAttachments(scene, system, places, poses)
-    gaps = [add_joint(ends, name, joint) for name, joint in scene.joints.items()]
+    gaps = [add_joint(ends, name, joint) for name, joint in scene.joints.items() if conditions(joint)]
     friction = (add_friction(ends, name, joint) for name, joint in scene.joints.items())
     exchanges = [exchange for exchange in friction if exchange is not None]
     exchanges += [add_load(ends, name, load) for name, load in scene.loads.items()]
+    penalties = add_contacts(ends)
     mbs.Assemble()
     reference = mbs.systemData.GetODE2Coordinates(configuration=exu.ConfigurationType.Reference)
-    return ExudynSystem(scene, system, mbs, container, clock, parts, gaps, exchanges, span(scene), np.array(reference))
+    return ExudynSystem(
+        scene, system, mbs, container, clock, parts, gaps, exchanges, penalties, span(scene), np.array(reference)
+    )

@@ -44,8 +44,7 @@ def judge(machine: ExudynSystem, record: KeptStates, failure: str) -> RunCheck:
     rows = np.unique(np.linspace(0, len(record.q) - 1, INSTANTS).astype(int))
     gap = machine.gap(record.q[rows], record.v[rows])
     energy, moving = machine.energy(record.times, record.q, record.v, rows)
-    # Motion that is prescribed feeds energy through constraints, which is not followed: there is no such check.
-    drift = float("nan") if machine.driven else _energy_drift(machine, record, rows, energy, moving)
+    drift = float("nan") if machine.unfollowed else _energy_drift(machine, record, rows, energy, moving)
     found: list[Finding] = []
     furthest = float(reach(machine.scene, np.asarray(np.max(moving))))
     far = float(np.max(distance_to_ground(machine.scene, points[..., None])))
@@ -59,6 +58,8 @@ def judge(machine: ExudynSystem, record: KeptStates, failure: str) -> RunCheck:
         found = [kinds.OUT_OF_REACH.found(text, distance=far, reach=furthest)]
     elif gap > LARGEST_GAP * machine.span:
         found = [kinds.NOT_CLOSED.found(f"a joint opened by {gap:.3g} m", REDUCE, gap=float(gap))]
+    elif fallen := [name for name, one in machine.penalties.items() if one.fallen(record.q, record.v)]:
+        found = [kinds.ENGINE_STOPPED.found(f"{fallen[0]}: a body fell through the surface; {REDUCE}")]
     elif drift > tolerance:
         text = f"energy is off by {drift:.3g}, allowed is {tolerance:.3g}"
         found = [kinds.ENERGY.found(text, REDUCE, drift=drift, allowed=tolerance)]

@@ -12,7 +12,8 @@ from shoal.engines.exudyn.chain import Chain
 from shoal.engines.poses import InitialPose, owner, start_of
 from shoal.errors import InputError
 from shoal.mechanics.start.rigid_bodies import lead
-from shoal.scene import Attachment, PointMass, Scene
+from shoal.scene import Attachment, PointMass, Scene, Slider
+from shoal.scene.contacts import ContactSurface
 from shoal.trajectory import Array
 
 
@@ -44,6 +45,25 @@ class SystemAttachments:
         if isinstance(self.part(second)[0], Chain):
             return [self.turn(first, turn), self.turn(second)]
         return [self.turn(first), self.turn(second, -turn)]
+
+    def slide(self, joint: Slider) -> Array:
+        """The direction (2,) of a slider's line in the frame of its first body."""
+        return np.array([np.cos(joint.direction), np.sin(joint.direction)])
+
+    def normal(self, surface: ContactSurface) -> Array:
+        """The normal (2,) of a line in its body's frame, to its left."""
+        assert surface.line is not None
+        return np.array([-np.sin(surface.line), np.cos(surface.line)])
+
+    def faced(self, at: Attachment, normal: Array) -> tuple[Any, Array]:
+        """A new marker, and axes (3, 3) as columns in its frame, whose third one is a normal in the body's frame."""
+        along = np.arctan2(normal[1], normal[0]) - np.pi / 2
+        return self.turn(at, along), np.eye(3)[:, [0, 2, 1]]
+
+    def pointing(self, at: Attachment, direction: Array, q: Array, v: Array) -> Array:
+        """A direction of a body's frame along a motion, (rows, 2)."""
+        angle = self.motion(at, q, v).direction + np.arctan2(direction[1], direction[0])
+        return np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
     def motion(self, at: Attachment, q: Array, v: Array) -> PointMotion:
         """Return the motion of an attachment."""

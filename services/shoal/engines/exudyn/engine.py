@@ -34,6 +34,8 @@ REDUNDANT = 0.9
 """Spectral radius for machines in space whose constraints depend on each other, unless the scene says its own."""
 FORCE_FLOOR = 32.0 * float(np.finfo(float).eps)
 """Of the forces of a machine, over their size; cables and beams of 4 to 16 elements end a step at 1 to 10 eps."""
+SHORTEST = 1e-6
+"""Shortest step over the stated one, where friction changes its sign."""
 MOST = 1e5
 """Most steps that a run takes because of narrow parts of a force law."""
 NAMES: dict[Beam, str] = {"ancf-cable": "exudyn", "geometrically-exact": "exudyn-ge"}
@@ -51,6 +53,9 @@ FEATURES = frozenset(
         "nonlinear springs",
         "tapered flexible rods",
         "machines in space",
+        "stops",
+        "one-sided distances",
+        "contacts",
     }
 )
 OWN_FEATURES: dict[Beam, frozenset[str]] = {
@@ -113,7 +118,7 @@ class ExudynEngine(OneByOne):
         end = float(wanted[-1])
         machine = self.machine(exu, scene, end)
         steps = choose_steps(wanted, scene.solver.step, machine.unknowns, machine.clock.halts)
-        record = KeptStates(steps, machine.reference)
+        record = KeptStates(steps, machine.reference, bool(machine.penalties))
         failure = self._run(exu, machine, record)
         if (much := _too_far(machine, record)) > 1.0:
             # As the native solver does, but with all steps.
@@ -174,7 +179,7 @@ class ExudynEngine(OneByOne):
             reason = "" if done else "the solver gave up"
         if not reason:
             return ""
-        reached = record.steps.instants[min(max(record.seen - 1, 0), record.steps.count)]
+        reached = record.times[max(record.filled - 1, 0)]
         return f"exudyn: {reason} at {reached:.6g} s of {record.steps.wanted[-1]:.6g} s; reduce solver.step"
 
     def simulation_settings(self, exu: Any, machine: ExudynSystem, steps: Steps) -> Any:
@@ -192,7 +197,14 @@ class ExudynEngine(OneByOne):
         integration = settings.timeIntegration
         integration.numberOfSteps = steps.count
         integration.endTime = steps.count * steps.size
-        integration.adaptiveStep = False
+        integration.adaptiveStep = bool(machine.penalties)
+        if machine.penalties:
+            # Newton's iteration fails where friction changes its sign within a step: there, and there only, steps are
+            # shortened. That Exudyn shortens them where contacts close as well makes results worse.
+            integration.adaptiveStepRecoverySteps = 0
+            integration.adaptiveStepDecrease = 0.25
+            integration.minimumStepSize = SHORTEST * steps.size
+            integration.discontinuous.useRecommendedStepSize = False
         integration.automaticStepSize = False
         integration.verboseMode = 0
         integration.newton.useModifiedNewton = self.modified_newton
@@ -222,6 +234,8 @@ class ExudynEngine(OneByOne):
     def _model(self, exu: Any, machine: ExudynSystem, steps: Steps) -> dict[str, Any]:
         integrator, radius = self._method(machine)
         rods = machine.scene.flexible_rods.values()
+        stiff = {name: one.stiffness for name, one in machine.penalties.items()}
+        contacts = {"contacts": stiff} if stiff else {}
         return {
             "exudyn": exu.__version__,
             "unknowns": machine.unknowns,
@@ -233,8 +247,8 @@ class ExudynEngine(OneByOne):
             "newton": "modified" if self.modified_newton else "full",
             "step": steps.size,
             "dependent_constraints": machine.dependent,
-            "energy_check": "none: motion is prescribed" if machine.driven else "kinetic, elastic, springs, loads",
-        }
+            "energy_check": f"none: {machine.unfollowed}" if machine.unfollowed else "kinetic, elastic, springs, loads",
+        } | contacts
 
 
 def _force_tolerance(machine: ExudynSystem) -> float:
@@ -252,6 +266,7 @@ def _force_tolerance(machine: ExudynSystem) -> float:
         stiffness = sections.axial / size + 12.0 * sections.bending / size**3
         forces.append(float(np.max(stiffness)) * extent)
     forces += [load.stiffness * extent for load in scene.loads.values() if isinstance(load, Spring)]
+    forces += [one.stiffness * extent for one in machine.penalties.values()]
     forces += [load.stiffness * np.pi for load in scene.loads.values() if isinstance(load, TorsionSpring)]
     return max(float(scene.solver.newton_tolerance), FORCE_FLOOR * max(forces, default=0.0))
 

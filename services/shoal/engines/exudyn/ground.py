@@ -65,16 +65,17 @@ def driven(system: System, f: Function, field: str) -> PiecewiseFunction:
 def mesh(system: System, first: Coordinate, second: Coordinate, ratio: float) -> None:
     """Let second be `ratio` times first; Exudyn counts coordinates from the start."""
     # Its constraint is factor1 times the coordinate of marker 1, less that of marker 0.
-    system.add("ObjectConnectorCoordinate", markerNumbers=_markers(system, second, first), factor1=ratio)
+    system.add("ObjectConnectorCoordinate", markerNumbers=coordinates(system, second, first), factor1=ratio)
 
 
-def _markers(system: System, *coordinates: Coordinate) -> list[Any]:
-    return [system.add("MarkerNodeCoordinate", nodeNumber=node, coordinate=number) for node, number in coordinates]
+def coordinates(system: System, *of: Coordinate) -> list[Any]:
+    """New markers on coordinates of nodes."""
+    return [system.add("MarkerNodeCoordinate", nodeNumber=node, coordinate=number) for node, number in of]
 
 
 def drive(system: System, first: Coordinate, second: Coordinate, course: PiecewiseFunction) -> None:
     """Let second - first follow a function of time; Exudyn counts coordinates from the start."""
-    markers = _markers(system, first, second)
+    markers = coordinates(system, first, second)
     system.add(
         "ObjectConnectorCoordinate",
         markerNumbers=markers,

@@ -97,16 +97,16 @@ def _add_distance(ends: SystemAttachments, where: str, joint: Distance) -> None:
 def _add_drive(ends: SystemAttachments, where: str, joint: DrivenAngle) -> None:
     """The angle is a difference of two coordinates, which Exudyn counts from the start."""
     course = driven(ends.system, joint.angle, f"{where}.angle")
-    drive(ends.system, _angle(ends, where, joint.first), _angle(ends, where, joint.second), course)
+    drive(ends.system, angle_of(ends, where, joint.first), angle_of(ends, where, joint.second), course)
 
 
 def _add_gear(ends: SystemAttachments, where: str, joint: Gear) -> None:
     if joint.carrier.body != GROUND:
         raise InputError(f"{where}.carrier: engine exudyn cannot do gears on a carrier that turns; use gauss")
-    mesh(ends.system, _angle(ends, where, joint.first), _angle(ends, where, joint.second), joint.ratio)
+    mesh(ends.system, angle_of(ends, where, joint.first), angle_of(ends, where, joint.second), joint.ratio)
 
 
-def _angle(ends: SystemAttachments, where: str, side: Attachment) -> Coordinate:
+def angle_of(ends: SystemAttachments, where: str, side: Attachment) -> Coordinate:
     """The coordinate of Exudyn that is the angle of a body."""
     ends.require_direction(where, side)
     part, _ = ends.part(side)

@@ -91,6 +91,10 @@ class KeptStates:
     steps: Steps
     reference: Array
     """Coordinates [m or rad] of the undeformed start, from which Exudyn counts, (unknowns,)."""
+    shortened: bool = False
+    """Whether Exudyn shortens steps where it has to: kept is the first that ends at a kept instant or later."""
+    times: Array = field(init=False)
+    """Time of each kept step [s], (kept,)."""
     q: Array = field(init=False)
     v: Array = field(init=False)
     seen: int = field(default=0, init=False)
@@ -101,18 +105,15 @@ class KeptStates:
     def __post_init__(self) -> None:
         self.q = np.full((len(self.steps.kept), self.reference.size), np.nan)
         self.v = np.full_like(self.q, np.nan)
+        self.times = self.steps.instants[self.steps.kept]
 
-    @property
-    def times(self) -> Array:
-        """Time of each kept step [s], (kept,)."""
-        return self.steps.instants[self.steps.kept]
-
-    def take(self, mbs: Any, _time: float) -> bool:
+    def take(self, mbs: Any, time: float) -> bool:
         """Exudyn's call after the initialisation and after each step."""
         if self.resumed:
             self.resumed = False
             return True
-        if self.steps.kept[self.filled] == self.seen:
+        while self._due(time):
+            self.times[self.filled] = time if self.shortened else self.times[self.filled]
             # GetODE2CoordinatesTotal, which adds the reference, aborts beyond about 100 coordinates (Exudyn 1.13.6).
             self.q[self.filled] = self.reference + mbs.systemData.GetODE2Coordinates()
             self.v[self.filled] = mbs.systemData.GetODE2Coordinates_t()
@@ -120,13 +121,22 @@ class KeptStates:
         self.seen += 1
         return True
 
+    def _due(self, time: float) -> bool:
+        if self.filled == len(self.times):
+            return False
+        if self.shortened:
+            return bool(time >= self.times[self.filled] - 1e-6 * self.steps.size)
+        return bool(self.steps.kept[self.filled] == self.seen)
+
     def at_wanted(self) -> tuple[Array, Array]:
         """Coordinates and velocities at the wanted times, (samples, unknowns) each; cubic Hermite between steps."""
         row = np.searchsorted(self.times, self.steps.wanted + 1e-9 * self.steps.size, side="right") - 1
         row = np.clip(row, 0, max(len(self.times) - 2, 0))
         after = np.minimum(row + 1, len(self.times) - 1)
         # Of a thinned record the last two kept steps need not be neighbours.
-        size = np.where(after > row, self.times[after] - self.times[row], self.steps.size)[:, None]
+        size = np.where(self.times[after] > self.times[row], self.times[after] - self.times[row], self.steps.size)[
+            :, None
+        ]
         s = (self.steps.wanted - self.times[row])[:, None] / size
         s = np.where(np.abs(s - np.round(s)) < 1e-6, np.round(s), s)
         q0, q1, v0, v1 = self.q[row], self.q[after], self.v[row] * size, self.v[after] * size

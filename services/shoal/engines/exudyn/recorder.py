@@ -104,6 +104,8 @@ class Texts:
             return items(key_of(value))
         if isinstance(value, np.ndarray):
             return f"np.array({self.of(value.tolist(), items)})"
+        if type(value).__name__ == "Vector3DList":
+            return f"exu.Vector3DList({self.of([value[k].tolist() for k in range(len(value))], items)})"
         if isinstance(value, bool | np.bool_ | str | None):
             return repr(value.item() if isinstance(value, np.bool_) else value)
         if isinstance(value, int | np.integer):

@@ -11,6 +11,7 @@ from shoal.engines.capabilities import loops
 from shoal.engines.course import Clock
 from shoal.engines.exudyn.bodies import System
 from shoal.engines.exudyn.build import Beam, ExudynSystem, silence
+from shoal.engines.exudyn.contacts import add_contacts
 from shoal.engines.exudyn.ground import drive, driven
 from shoal.engines.exudyn.space.beam import SpatialBeamPart
 from shoal.engines.exudyn.space.bodies import SolidPart, SpatialCablePart, SpatialGround
@@ -73,13 +74,15 @@ def build_in_space(
     friction = (add_friction(ends, name, joint) for name, joint in scene.joints.items())
     exchanges = [exchange for exchange in friction if exchange is not None]
     exchanges += [add_load(ends, name, load) for name, load in scene.loads.items()]
+    penalties = add_contacts(ends)
     mbs.Assemble()
     reference = mbs.systemData.GetODE2Coordinates(configuration=exu.ConfigurationType.Reference)
     started = scene.model_copy(update={"initial": body_states(placement.frames, scene, q, v)})
     dependent = _dependent(exu, mbs) if any(loops(scene)) else 0
     return ExudynSystem(
-        started, system, mbs, container, clock, parts, gaps, exchanges, span(scene), np.array(reference), dependent
-    )
+        started, system, mbs, container, clock, parts, gaps, exchanges, penalties, span(scene), np.array(reference),
+        dependent,
+    )  # fmt: skip
 
 
 def _dependent(exu: Any, mbs: Any) -> int:

@@ -15,7 +15,8 @@ from shoal.engines.poses import owner
 from shoal.mechanics import rotation as turns
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
 from shoal.mechanics.assembly.space.sections import image
-from shoal.scene import Attachment
+from shoal.scene import Attachment, Slider
+from shoal.scene.contacts import ContactSurface
 from shoal.trajectory import Array
 
 
@@ -52,6 +53,28 @@ class SpatialEnds(SystemAttachments):
     def image(self, at: Attachment, axis: Any) -> Array:
         """The unit vector (3,) of an axis as it points at the start, in the frame of a body or of a rod's section."""
         return np.asarray(image(self.scene, self.placement.attitudes, at, axis)[:, 0])
+
+    def slide(self, joint: Slider) -> Array:
+        """The direction (3,) of a slider's line in the frame of its first body: an axis at the start, or an angle."""
+        return self.line(joint.first, joint.direction if joint.axis is None else joint.axis)
+
+    def line(self, at: Attachment, along: Any) -> Array:
+        """The direction (3,) of a line in its body's frame: an axis at the start, or an angle there."""
+        if isinstance(along, tuple):
+            return self.image(at, along)
+        return np.array([np.cos(along), np.sin(along), 0.0])
+
+    def normal(self, surface: ContactSurface) -> Array:
+        """The normal (3,) of a plane in its body's frame."""
+        return self.image(surface, surface.plane)
+
+    def faced(self, at: Attachment, normal: Array) -> tuple[Any, Array]:
+        """See SystemAttachments."""
+        return self.framed(at, frame_about(normal)), np.eye(3)
+
+    def pointing(self, at: Attachment, direction: Array, q: Array, v: Array) -> Array:
+        """A direction of a body's frame along a motion, (rows, 3)."""
+        return np.asarray(self.moved(at, q, v).axes @ direction)
 
     def moved(self, at: Attachment, q: Array, v: Array) -> SpatialPointMotion:
         """Return the motion of an attachment."""

@@ -98,7 +98,7 @@ def _angle(first: Array, second: Array) -> Array:
 
 def _add_rail(ends: SpatialEnds, where: str, joint: Slider, law: ForceLaw) -> Exchange:
     require_rigid(ends, where, joint.first)
-    line = _line(ends, joint.first, joint.direction if joint.axis is None else joint.axis)
+    line = ends.slide(joint)
     ends.system.add(
         "ObjectConnectorLinearSpringDamper",
         markerNumbers=[ends.turn(joint.first), ends.turn(joint.second)],
@@ -113,13 +113,6 @@ def _add_rail(ends: SpatialEnds, where: str, joint: Slider, law: ForceLaw) -> Ex
         return np.sum(along * apart, 1), np.sum(along * speed + change * apart, 1)
 
     return exchange_of(law, measure)
-
-
-def _line(ends: SpatialEnds, at: Attachment, along: Any) -> Array:
-    """The direction (3,) of a line in its body's frame: an axis at the start, or an angle there."""
-    if isinstance(along, tuple):
-        return ends.image(at, along)
-    return np.array([np.cos(along), np.sin(along), 0.0])
 
 
 def _lock(ends: SpatialEnds, first: Attachment, second: Attachment, axes: list[int], one: Array, other: Array) -> None:
@@ -159,7 +152,7 @@ def _apart(ends: SpatialEnds, one: Any, q: Array, v: Array) -> Array:
 
 def _along(exu: Any, ends: SpatialEnds, where: str, one: Along) -> Gap:
     require_rigid(ends, where, one.first)
-    line = _line(ends, one.first, one.direction)
+    line = ends.line(one.first, one.direction)
     _lock_place(exu, ends, one.first, one.second, [1, 1, 0], frame_about(line))
 
     def gap(q: Array, v: Array) -> Array:
