@@ -67,6 +67,11 @@ MACHINES = {
         joints={"J": {"kind": "slider", "axis": [1.0, 0.0, -0.5], "first": {"body": "ground", "point": [0, 0, 0]},
                       "second": {"body": "A"}, "stops": {"max": 0.4, "restitution": 0.6}}}),
 }  # fmt: skip
+MACHINES["pin-with-play"] = machine(
+    BALL, {"angle": -0.5, "position": [0.5 * np.cos(0.5) + 0.01, -0.5 * np.sin(0.5)]}, 0.3,
+    joints={"J": {"first": GROUND, "second": {"body": "A", "point": [-0.5, 0.0]}, "play": 0.03, "radius": 0.02,
+                  "restitution": 0.5}},
+)  # fmt: skip
 DAILY = ("hinge", "circle-on-line")
 
 

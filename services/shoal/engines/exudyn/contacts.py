@@ -23,6 +23,7 @@ from shoal.mechanics.assembly.masses import second_moments
 from shoal.mechanics.fitting import start_value
 from shoal.mechanics.reach import span
 from shoal.scene import Attachment, Distance, Revolute, RigidBody, Rod, Scene, Slider
+from shoal.scene.clearances import contacts_of
 from shoal.scene.contact_law import loss_of
 from shoal.scene.contacts import Contact
 from shoal.scene.dimensions import padded
@@ -85,9 +86,9 @@ class _Builder:
                 yield from self._rail(f"{where}.stops", joint, joint.stops)
             elif isinstance(joint, Distance) and joint.keeps != "exactly":
                 yield where, self._rope(joint)
-        for name, contact in self.scene.contacts.items():
-            self.ends.system.enter(f"contacts.{name}")
-            yield f"contacts.{name}", self._contact(f"contacts.{name}", contact)
+        for where, contact in contacts_of(self.scene).items():
+            self.ends.system.enter(where)
+            yield where, self._contact(where, contact)
 
     def _hinge(self, where: str, joint: Revolute, stops: Stops) -> Iterator[tuple[str, Penalty]]:
         """Limits of the difference of two coordinates, which Exudyn counts from the start."""

@@ -56,6 +56,7 @@ FEATURES = frozenset(
         "stops",
         "one-sided distances",
         "contacts",
+        "play",
     }
 )
 OWN_FEATURES: dict[Beam, frozenset[str]] = {
