@@ -10,7 +10,7 @@ BIN := .venv/bin
 STAMP := .venv/.installed
 DEVELOPED := .venv/.developed
 # What commands, flows, services and `make up` need; the rest of the lock is for development.
-RUN := engines mujoco pipeline services deploy scale fmu notebook sample
+RUN := engines mujoco xacro pipeline services deploy scale fmu notebook sample
 SUITABLE := import sys, venv, ensurepip; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 12))
 
 # Without compiled modules every process of the tests would spend seconds on reading sources. What every command imports is

@@ -208,37 +208,43 @@ def parts(found: Imported) -> Any:
     return found.scene, [line.split(" (from line")[0] for line in found.left_out], found.missing, found.notes
 
 
-def test_a_root_link_with_mass_is_a_note_and_a_floating_joint_frees_it(tmp_path: Path) -> None:
+def test_the_root_is_held_or_floats_as_asked(tmp_path: Path) -> None:
+    """By default it is held if anything else moves, and a note says so either way."""
     rng = np.random.default_rng(3)
     robot = ET.Element("robot", name="r")
     link(robot, "trunk", rng)
     path = written(robot, tmp_path)
-    with pytest.raises(InputError, match="nothing in it moves; <link trunk> in line 1: the root, with"):
-        read(path)
+    alone = read(path)
+    assert "--root fixed" in alone.notes[0]
+    times = np.array([0.1, 0.2])
+    fallen = simulate(Scene.parse(alone.scene), times).marker("trunk")[:, 2]
+    assert fallen == pytest.approx(-9.81 / 2 * times**2, abs=1e-9)
+    with pytest.raises(InputError, match="nothing in it moves"):
+        read(path, "fixed")
     link(robot, "leg", rng)
     joint = ET.SubElement(robot, "joint", name="hip", type="continuous")
     ET.SubElement(joint, "parent", link="trunk")
     ET.SubElement(joint, "child", link="leg")
     ET.SubElement(robot, "link", name="world")
-    (note,) = read(written(robot, tmp_path)).notes
-    assert "fixed to the ground" in note
-    said = note[note.index("<joint name=") :].replace("...", "base")
-    robot.append(ET.fromstring(said))
-    freed = read(written(robot, tmp_path))
+    path = written(robot, tmp_path)
+    (note,) = read(path).notes
+    assert "fixed to the ground; --root floating frees it" in note
+    freed = read(path, "floating")
     assert freed.notes == ()
     assert set(freed.scene["bodies"]) == {"trunk", "leg"}
-    assert distance(path, freed) < 1e-7
+    said = '<joint name="base" type="floating"><parent link="world"/><child link="trunk"/></joint>'
+    robot.append(ET.fromstring(said))
+    assert distance(written(robot, tmp_path), freed) < 1e-7
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ('<robot name="r"><xacro:arm/></robot>', "<xacro:arm> in line 1: a macro of xacro"),
         ('<robot name="r"><link name="a"></robot>', "no well-formed XML: mismatched tag in line 1"),
         (
             '<robot name="r"><link name="b"/><link name="a"/><joint name="j" type="continuous">'
             '<parent link="b"/><child link="a"/></joint></robot>',
-            "<link a> in line 1: moves and has no mass",
+            "nothing in it moves; <link a> in line 1: has no mass",
         ),
         (
             '<robot name="r"><link name="a"/><joint name="j" type="fixed"><parent link="b"/><child link="a"/>'

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from shoal.errors import InputError
 from shoal.imported import read
 from shoal.mechanics.analysis.statics import statics
 from shoal.mechanics.simulate import simulate
@@ -136,15 +135,6 @@ TOLD: dict[str, tuple[str, tuple[str, ...]]] = {
         (f"joint f: damping 3; {ONLY}", f"joint f: frictionloss 1; {ONLY}", "joint f: its spring (stiffness 30.0)",
          "joint f: its armature 2"),
     ),
-    "mass-resisted": (
-        machine(SLIDES.replace('1 0 0"', '1 0 0" name="x" damping="3" frictionloss="1" armature="2" stiffness="30" '
-                               'range="-.1 .1"'), CENTRED).replace("tip", "centre").replace(".6 0 .1", "0 0 0"),
-        (f"joint x: damping 3; {ONLY}", f"joint x: frictionloss 1; {ONLY}", "joint x: its spring (stiffness 30.0)",
-         "joint x: its limits -0.1 to 0.1", "joint x: its armature 2"),
-    ),
-    "gantry-resisted": (
-        machine(SLIDES.replace('1 0 0"', '1 0 0" name="x" damping="3"')), (f"joint x: damping 3; {ONLY}",),
-    ),
     "hinge-polynomials": (machine(hinge('damping="1 2 3"')), ("joint h: cubic damping 3",)),
     "slide-polynomial": (machine(slide('stiffness="200 5"')), ("joint s: the part 5.0 * t**2 of its spring",)),
     "ball-polynomials": (
@@ -194,17 +184,37 @@ def test_a_mass_alone_stays_a_point_mass(tmp_path: Path) -> None:
     assert read(written(text, tmp_path)).scene["bodies"]["b"] == {"kind": "point-mass", "mass": 2.0}
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        machine('<joint axis="0 0 1"/><joint axis="1 0 0"/><joint axis="0 0 1" armature="1"/>'),
-        machine("<freejoint/>", inside=f'<body name="c">{SLIDES}{OFF}</body>'),
-    ],
-    ids=["hinges-of-two-axes", "slides-on-a-body-that-moves"],
-)
-def test_joints_that_no_scene_has_are_refused(text: str, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="no joint of a scene stands for its 3 joints"):
-        read(written(text, tmp_path))
+CHAINS = {
+    "hinges-apart": machine('<joint axis="0 0 1"/><joint axis="1 0 0"/><joint axis="0 1 0" pos=".1 0 .1"/>'),
+    "hinges-apart-and-oblique": machine(
+        '<joint axis="0 1 0" pos="0 0 .08" damping=".5"/><joint axis="1 0 .5" pos="0 0 .04" stiffness="9"/>'
+    ),
+    "slides-on-a-body-that-moves": machine(
+        hinge(), inside=f'<body name="c" pos=".2 .1 0">{SLIDES}{OFF}</body>', beside=""
+    ),
+    "slides-with-damping": machine(SLIDES.replace('"1 0 0"', '"1 0 0" damping="3"') + '<joint axis="1 2 0"/>'),
+    "slide-on-an-oblique-hinge": machine(
+        '<joint axis="0 1 0"/><joint type="slide" axis="1 0 1" stiffness="80"/>', pose=TURNED
+    ),
+    "ball-on-a-hinge": machine('<joint axis="0 1 0" damping=".3" pos=".1 0 0"/><joint type="ball"/>', inside=CHILD),
+}
+
+
+@pytest.mark.parametrize("name", CHAINS)
+def test_joints_that_no_single_one_stands_for_are_a_chain(name: str, tmp_path: Path) -> None:
+    """Of bodies that weigh 1e-9 of what they carry; what acts in each joint acts in the scene too."""
+    path = written(CHAINS[name], tmp_path)
+    found = read(path)
+    assert found.left_out == ()
+    assert any(body.endswith("-link") for body in found.scene["bodies"])
+    assert apart(path, found.scene) < 1e-8
+
+
+def test_a_chain_starts_with_the_rates_of_its_file(tmp_path: Path) -> None:
+    joints = '<joint axis="0 1 0" pos="0 .1 .08"/><joint axis="1 0 .5" damping=".1"/><joint type="slide" axis="1 1 0"/>'
+    key = '<keyframe><key name="start" qvel="1 2 .3"/></keyframe>'
+    path = written(machine(joints, more=key), tmp_path)
+    assert apart(path, read(path).scene) < 1e-8
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -73,8 +73,14 @@ def export(asked: Export, out: Out) -> None:
 @click.command("import")
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--partial", is_flag=True, help="Write the scene although constraints of the file are not in it.")
+@click.option(
+    "--root", type=click.Choice(["fixed", "floating"]), help="Whether the ground holds the root of a URDF file."
+)
+@click.option(
+    "--argument", "stated", multiple=True, metavar="NAME=VALUE", help="An argument of the macros of a file (xacro)."
+)
 @options.out(".yaml", otherwise="; else the file's name")
-def import_scene(file: Path, partial: bool, out: Out) -> None:
+def import_scene(file: Path, partial: bool, root: Any, stated: tuple[str, ...], out: Out) -> None:
     """Write the machine of FILE (URDF, or MuJoCo's MJCF) as a scene. What has no counterpart is listed on stderr."""
     import yaml
 
@@ -82,7 +88,9 @@ def import_scene(file: Path, partial: bool, out: Out) -> None:
     from shoal.imported import read
     from shoal.whole import whole
 
-    found = read(file)
+    if wrong := next((one for one in stated if "=" not in one), None):
+        raise InputError(f"--argument: must be NAME=VALUE, found {wrong[:40]!r}")
+    found = read(file, root, dict(one.split("=", 1) for one in stated))
     if found.missing and not partial:
         others = f" (and {len(found.missing) - 1} more)" if len(found.missing) > 1 else ""
         what = f"{found.missing[0]}{others} has no counterpart: the scene would be another machine"

@@ -71,7 +71,8 @@ MJCF: Known = {
     "flexstrain": _WHOLE,
 }
 URDF: Known = {
-    **_OPTIONS,
+    "option": _OPTIONS["option"],
+    "flag": _OPTIONS["flag"],
     "robot": _of("name"),
     "robot/mujoco": frozenset(),
     "robot/link": _of("name"),
@@ -87,6 +88,7 @@ URDF: Known = {
     "joint/dynamics": _of("damping friction"),
     "joint/limit": _of("lower upper"),
     "joint/mimic": _of("joint multiplier offset"),
+    "robot/loop_joint": _WHOLE,
 }
 _OF_TYPES = {
     "joint/axis": ("revolute", "continuous", "prismatic", "planar"),

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from shoal.imported.rounding import ROUNDED
-from shoal.imported.source import Array, Source
+from shoal.imported.rounding import ROUNDED, Array
+from shoal.imported.source import Source
 
 
 @dataclass

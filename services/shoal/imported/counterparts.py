@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from shoal.imported.axes import are_parallel, are_square
-from shoal.imported.rounding import ROUNDED, numbers
-from shoal.imported.source import Array
+from shoal.imported.rounding import ROUNDED, Array, numbers
 
 
 def counterparts(kinds: Any, found: list[Any], axes: list[Array], together: bool) -> list[dict[str, Any]]:

@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from shoal.imported.axes import are_parallel
 from shoal.imported.parts import Parts
-from shoal.imported.rounding import ROUNDED, numbers
-from shoal.imported.source import Array, Source
+from shoal.imported.rounding import ROUNDED, Array, numbers
+from shoal.imported.source import Source
 from shoal.scene.joints import MOST_TEETH
 
 

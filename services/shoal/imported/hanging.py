@@ -6,23 +6,27 @@ from typing import Any
 
 import numpy as np
 
-from shoal.errors import InputError
 from shoal.imported.axes import Axes, meet, span
+from shoal.imported.bodies import initial, light
 from shoal.imported.counterparts import counterparts
 from shoal.imported.parts import Parts
+from shoal.imported.rounding import numbers
 from shoal.imported.source import Source
-from shoal.imported.springs import add_resistance
+from shoal.imported.springs import add_resistance, resists
 
 
 def hang(source: Source, body: int, axes: Axes, parts: Parts) -> None:
     """Adds the joints of a body to its parent, and what acts in them; its axes agree with `axes`, to which they come.
 
-    Raises InputError for several joints that no single one stands for.
+    Between several joints that no single one stands for, or that resist, are bodies that weigh next to nothing.
     """
     kinds, own = source.mujoco.mjtJoint, source.own(body)
+    if len(own) > 1 and any(resists(source, one) for one in own):
+        _chain(source, body, axes, parts)
+        return
     types = {one: kinds(source.model.jnt_type[one]) for one in own}
     found = [*types.values()]
-    parent, name = source.model.body_parentid[body], source.names[body]
+    parent = source.model.body_parentid[body]
     sliding = [one for one in own if types[one] == kinds.mjJNT_SLIDE]
     turning = [one for one in own if one not in sliding]
     anywhere, anyhow = len(sliding) == 3 and span(source, sliding), _turns_anyhow(source, turning)
@@ -46,13 +50,39 @@ def hang(source: Source, body: int, axes: Axes, parts: Parts) -> None:
     else:
         stands = counterparts(kinds, found, along, together=meet(source, turning))
     if not stands:
-        raise InputError(f"{name}: no joint of a scene stands for its {len(own)} joints; put bodies between them")
-    called = source.joint_names[own[0]] if own else f"{name}-weld"
+        _chain(source, body, axes, parts)
+        return
+    called = source.joint_names[own[0]]
     for plane in stands[:-1]:
         parts.joints[f"{called}-plane"] = sides | plane
     made = sides | stands[-1]
     add_resistance(source, own, made, parts)
     parts.joints[called] = made
+
+
+def _chain(source: Source, body: int, axes: Axes, parts: Parts) -> None:
+    """Add a body that weighs next to nothing between every two joints of a body, so that each acts by itself."""
+    kinds, own = source.mujoco.mjtJoint, source.own(body)
+    behind: dict[str, Any] = {}
+    for number, one in enumerate(own):
+        name, kind = source.joint_names[one], kinds(source.model.jnt_type[one])
+        last = one == own[-1]
+        owner = source.names[body] if last else f"{name}-link"
+        if not last:
+            parts.between.add(owner)
+            parts.bodies[owner] = light(source, body)
+            parts.initial[owner] = initial(source, body, joints=number + 1)
+        place = source.data.xanchor[one] if kind != kinds.mjJNT_SLIDE else source.data.xpos[body]
+        local = source.axes(body).T @ (place - source.data.xpos[body])
+        here = source.at(source.model.body_parentid[body], place) if number == 0 else behind | {"point": numbers(local)}
+        if kind == kinds.mjJNT_BALL:
+            made: dict[str, Any] = {"kind": "spherical"}
+        else:
+            (made,) = counterparts(kinds, [kind], [axes.trued(source.data.xaxis[one])], together=True)
+        behind = {"body": owner}
+        made = {"first": here, "second": {"body": owner, "point": numbers(local)}} | made
+        add_resistance(source, [one], made, parts)
+        parts.joints[name] = made
 
 
 def _turns_anyhow(source: Source, turning: list[int]) -> bool:

@@ -19,7 +19,7 @@ def add_stops(source: Source, one: int, made: dict[str, Any], simple: bool, part
     if not model.jnt_limited[one]:
         return
     low, high = map(float, model.jnt_range[one])
-    start = float(model.qpos0[model.jnt_qposadr[one]])
+    start = float(source.data.qpos[model.jnt_qposadr[one]])
     told = f"joint {name}: its limits {low:g} to {high:g}"
     if not simple:
         parts.left_out.append(f"{told}; only a revolute joint or a slider has them")

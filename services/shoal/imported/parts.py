@@ -18,8 +18,12 @@ class Parts:
     """A line for everything that has no counterpart."""
     missing: list[str] = field(default_factory=list)
     """Those of them that hold bodies: without them the machine has other degrees of freedom."""
+    notes: list[str] = field(default_factory=list)
+    """A line for each assumption."""
     kept: set[int] = field(default_factory=set)
     """Equalities that joints stand for already, as MuJoCo counts them."""
+    between: set[str] = field(default_factory=set)
+    """Bodies between joints of one body of the file."""
     away: dict[str, float] = field(default_factory=dict)
     """Of torsion springs that do not rest at the start, the angle [rad] from there to where they do."""
 

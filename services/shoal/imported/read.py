@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import warnings
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,14 +20,16 @@ from shoal.imported.axes import Axes
 from shoal.imported.bodies import initial, is_mass, mass, rigid
 from shoal.imported.equalities import add_equalities
 from shoal.imported.hanging import hang
+from shoal.imported.loops import add_loops
 from shoal.imported.markup import XmlElement, parse, with_includes
+from shoal.imported.packages import expand
 from shoal.imported.parts import Parts
 from shoal.imported.rounding import numbers
 from shoal.imported.source import Source
 from shoal.imported.springs import add_resistance
 from shoal.imported.switches import switch_off
 from shoal.imported.tendons import add_tendons
-from shoal.imported.urdf import urdf_spec
+from shoal.imported.urdf import Robot, Root, urdf_robot
 from shoal.scene import GROUND, Scene
 
 
@@ -46,41 +49,51 @@ class Imported:
     warnings: tuple[str, ...] = ()
 
 
-def read(file: Path) -> Imported:
+def read(file: Path, root: Root | None = None, arguments: Mapping[str, str] | None = None) -> Imported:
     """Return the scene of a URDF or MJCF file at its own start, in metres, kilograms, seconds and radians.
 
-    Raises InputError if there is no such file, if MuJoCo refuses it, if nothing in it moves, or if it has bodies or
-    joints that no scene has, and ModuleNotFoundError without MuJoCo.
+    root: whether the ground holds the root of a URDF file; by default it does if anything else moves. arguments: of
+    macros of xacro. Raises InputError if there is no such file, if it is wrong or if nothing in it moves, and
+    ModuleNotFoundError without MuJoCo.
     """
     import mujoco
 
     if not file.is_file():
         raise InputError(f"{file}: no such file")
     written = file.read_bytes()
-    root = parse(file, written)
-    try:
-        with warnings.catch_warnings(record=True, action="always") as told:
-            if root.tag == "robot":
-                spec, notes = urdf_spec(mujoco, file, written, root)
-            else:
-                spec, notes = mujoco.MjSpec.from_file(str(file)), []
-            model = spec.compile()
-    except ValueError as error:
-        said = " ".join(str(error).split())
-        shape = root.tag == "robot" and "opening file" in said
-        more = "; it would give a link its mass: give that link an <inertial> instead" if shape else ""
-        raise InputError(f"{file}: {said}{more}") from None
+    xml = parse(file, written)
+    if file.suffix == ".xacro" or any(one.tag.startswith("xacro:") for one in xml.walk()):
+        xml = parse(file, expand(file, arguments or {}))
+    with warnings.catch_warnings(record=True, action="always") as told:
+        robot = urdf_robot(mujoco, file, xml, root) if xml.tag == "robot" else Robot(_mjcf(mujoco, file))
+        model = _compiled(file, robot.spec)
     switch_off(mujoco, model)
     source = Source.of(mujoco, model)
     parts = _parts(source)
+    add_loops(file, source, robot.loops, parts)
+    notes = [*robot.notes, *parts.notes]
     if not parts.bodies:
-        raise InputError(f"{file}: nothing in it moves{''.join(f'; {note}' for note in notes)}")
-    _audit(file, root, parts)
+        raise InputError(f"{file}: nothing in it moves{''.join(f'; {line}' for line in [*robot.left_out, *notes][:3])}")
+    parts.left_out = robot.left_out + parts.left_out
+    _audit(file, xml, parts)
     scene = _scene(source, parts, re.sub(r"[^A-Za-z0-9_-]", "-", file.stem))
     _count_angles(scene, parts.away, str(file))
     warned = tuple(" ".join(str(one.message).split()) for one in told)
-    notes += limits.note(parts)
-    return Imported(scene, tuple(parts.left_out), tuple(parts.missing), tuple(notes), warned)
+    return Imported(scene, tuple(parts.left_out), tuple(parts.missing), (*notes, *limits.note(parts)), warned)
+
+
+def _mjcf(mujoco: Any, file: Path) -> Any:
+    try:
+        return mujoco.MjSpec.from_file(str(file))
+    except ValueError as error:
+        raise InputError(f"{file}: {' '.join(str(error).split())}") from None
+
+
+def _compiled(file: Path, spec: Any) -> Any:
+    try:
+        return spec.compile()
+    except ValueError as error:
+        raise InputError(f"{file}: {' '.join(str(error).split())}") from None
 
 
 def _audit(file: Path, root: XmlElement, parts: Parts) -> None:
@@ -101,7 +114,7 @@ def _parts(source: Source) -> Parts:
         if source.owners[body] != body:
             continue
         name, alone = source.names[body], is_mass(source, body)
-        parts.bodies[name] = mass(source, body) if alone else rigid(source, body)
+        parts.bodies[name] = mass(source, body) if alone else rigid(source, body, parts)
         parts.initial[name] = initial(source, body, turns=not alone)
         if alone:
             add_resistance(source, source.own(body), {"kind": "point-mass"}, parts)
@@ -132,7 +145,7 @@ def _scene(source: Source, parts: Parts, name: str) -> dict[str, Any]:
 
 def _markers(source: Source, parts: Parts) -> dict[str, Any]:
     """One at the origin of every body, and one at every site that moves."""
-    markers: dict[str, Any] = {name: {"body": name} for name in parts.bodies}
+    markers: dict[str, Any] = {name: {"body": name} for name in parts.bodies if name not in parts.between}
     for site, marker in enumerate(source.called(source.mujoco.mjtObj.mjOBJ_SITE, source.model.nsite, "site")):
         at = source.at_site(site)
         if at["body"] != GROUND:

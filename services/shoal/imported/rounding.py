@@ -5,6 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
 
 ROUNDED = 1e-5
 """Of an angle [rad] or a length [m] as a file's rounding may leave it: 3.1416 is 7e-6 off half a turn."""

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
+from scipy.spatial.transform import Rotation
 
-from shoal.imported.rounding import numbers
+from shoal.imported.composite import Moments
+from shoal.imported.rounding import Array, numbers
 from shoal.scene import GROUND
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -29,7 +28,11 @@ class Source:
     """Those of the bodies, as a scene may have them."""
     joint_names: list[str]
     owners: list[int]
-    """Of each body, the one that has it as a place of its own."""
+    """Of each body, the one that it is a part of: what no joint moves against its parent is part of that."""
+    moments: list[Moments]
+    """Of each body with its parts, in its frame."""
+    carried: list[Moments]
+    """Of each body with all that hangs on it, in its frame at the start."""
     key: int | None
     """The keyframe that the rates of the start are from; None is a start from rest."""
 
@@ -37,12 +40,20 @@ class Source:
     def of(cls, mujoco: Any, model: Any) -> Source:
         """A model in the pose in which its file draws it, with the rates of a keyframe `start` in that pose."""
         data, key = mujoco.MjData(model), _start(mujoco, model)
+        _couple(mujoco, model, data)
         if key is not None:
             data.qvel[:] = model.key_qvel[key]
         mujoco.mj_forward(model, data)
         names = _called(mujoco, model, mujoco.mjtObj.mjOBJ_BODY, model.nbody, "body")
         joints = _called(mujoco, model, mujoco.mjtObj.mjOBJ_JOINT, model.njnt, "joint")
-        return cls(mujoco, model, data, names, joints, _owners(model), key)
+        owners = _owners(model)
+        parts = [(owners[body], body) for body in range(1, model.nbody)]
+        hung = [(owners[model.body_parentid[body]], body) for body in range(1, model.nbody) if owners[body] == body]
+        moments = _gathered(model, data, parts)
+        carried = [one + Moments() for one in moments]
+        for parent, body in reversed(hung):
+            carried[parent] += _seen(data, carried[body], body, parent)
+        return cls(mujoco, model, data, names, joints, owners, moments, carried, key)
 
     def called(self, kind: Any, count: int, what: str) -> list[str]:
         """Names of all objects of a kind (mjtObj), each once and as a scene may have them; `what` and a number else."""
@@ -81,6 +92,17 @@ def _start(mujoco: Any, model: Any) -> int | None:
     return None
 
 
+def _couple(mujoco: Any, model: Any, data: Any) -> None:
+    """Move joints that equalities let follow others to where those want them at the start."""
+    for _ in range(model.neq):
+        for number in np.flatnonzero((model.eq_type == int(mujoco.mjtEq.mjEQ_JOINT)) & (model.eq_active0 != 0)):
+            driven, driving = int(model.eq_obj1id[number]), int(model.eq_obj2id[number])
+            here = model.jnt_qposadr[driven]
+            there = model.jnt_qposadr[driving] if driving >= 0 else here
+            moved = data.qpos[there] - model.qpos0[there] if driving >= 0 else 0.0
+            data.qpos[here] = model.qpos0[here] + np.polyval(model.eq_data[number][4::-1], moved)
+
+
 def _called(mujoco: Any, model: Any, kind: Any, count: int, what: str) -> list[str]:
     found: list[str] = []
     for number in range(count):
@@ -94,7 +116,23 @@ def _called(mujoco: Any, model: Any, kind: Any, count: int, what: str) -> list[s
 def _owners(model: Any) -> list[int]:
     owners = [0]
     for body in range(1, model.nbody):
-        # A frame without mass that is fixed to its parent is a place on it.
-        alias = model.body_mass[body] == 0 and model.body_jntnum[body] == 0
-        owners.append(owners[model.body_parentid[body]] if alias else body)
+        owners.append(body if model.body_jntnum[body] else owners[model.body_parentid[body]])
     return owners
+
+
+def _gathered(model: Any, data: Any, parts: list[tuple[int, int]]) -> list[Moments]:
+    """Return the moments of bodies with their parts. parts: (body, part) each."""
+    found = [Moments() for _ in range(model.nbody)]
+    for body, part in parts:
+        turn = Rotation.from_quat(model.body_iquat[part], scalar_first=True).as_matrix()
+        inertia = turn @ np.diag(model.body_inertia[part]) @ turn.T
+        own = Moments.of(float(model.body_mass[part]), model.body_ipos[part], inertia)
+        found[body] += _seen(data, own, part, body)
+    return found
+
+
+def _seen(data: Any, own: Moments, body: int, other: int) -> Moments:
+    """Return moments in the frame of one body in that of another."""
+    axes = data.xmat[other].reshape(3, 3)
+    place = axes.T @ (data.xpos[body] - data.xpos[other])
+    return own if body == other else own.moved(axes.T @ data.xmat[body].reshape(3, 3), place)

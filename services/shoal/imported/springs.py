@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from shoal.imported.limits import add_stops
 from shoal.imported.parts import Parts
-from shoal.imported.rounding import numbers
-from shoal.imported.source import Array, Source
+from shoal.imported.rounding import Array, numbers
+from shoal.imported.source import Source
 
 
 def law(stiffness: float, further: Array) -> dict[str, Any]:
@@ -30,6 +32,16 @@ def add_resistance(source: Source, own: list[int], made: dict[str, Any], parts: 
         _add_spring(source, one, made, parts)
         add_stops(source, one, made, _is_simple(source, one, made), parts)
         _tell_rest(source, one, parts)
+
+
+def resists(source: Source, one: int) -> bool:
+    """Return whether anything acts in a joint that only a revolute joint or a slider of a scene has."""
+    model, dof = source.model, source.model.jnt_dofadr[one]
+    sizes = (
+        model.jnt_stiffness[one], model.jnt_stiffnesspoly[one], model.dof_damping[dof], model.dof_dampingpoly[dof],
+        model.dof_frictionloss[dof], model.dof_armature[dof], float(model.jnt_limited[one]),
+    )  # fmt: skip
+    return any(map(np.any, sizes))
 
 
 def _is_simple(source: Source, one: int, made: dict[str, Any]) -> bool:
@@ -86,7 +98,7 @@ def _spring(source: Source, one: int, made: dict[str, Any], turned: dict[str, fl
     """
     model = source.model
     address = model.jnt_qposadr[one]
-    away = float(model.qpos_spring[address] - model.qpos0[address])
+    away = float(model.qpos_spring[address] - source.data.qpos[address])
     sides = {side: made[side] for side in ("first", "second")}
     if made["kind"] == "revolute":
         if away:
@@ -94,6 +106,8 @@ def _spring(source: Source, one: int, made: dict[str, Any], turned: dict[str, fl
         return {"kind": "torsion-spring", **sides, "axis": made["axis"]}
     # Without length it pulls back by the whole way to the place of rest, on both sides of it.
     body, (side, place) = model.jnt_bodyid[one], made["first"].values()
-    holder, sign = (body, -1) if side == source.names[body] else (source.owners[model.body_parentid[body]], 1)
+    parent, sign = source.owners[model.body_parentid[body]], -1 if side == source.names[body] else 1
+    # A body between two joints of one has the axes of that.
+    holder = parent if side == source.at(parent, place)["body"] else body
     point = place + source.axes(holder).T @ made["axis"] * sign * away
     return {"kind": "spring", **sides, "first": {"body": side, "point": numbers(point)}, "length": 0.0}
