@@ -444,6 +444,10 @@ ONLY_NATIVE = [
         {"half": at("A", "centre")},
         initial={"A": {"position": [0.0, 0.0]}},
     ),
+    pair(
+        "fed-back",
+        {"E": HANG},
+    ).with_values({"loads": {"M": {"kind": "torque", "at": at("A"), "torque": "1 - 0.1*angle(A)"}}}),
     pendulum("at-rest", CABLE, CLAMP).with_values({"initial.from": "statics", "initial.A.rate": 0.0}),
     scene(
         "going-on",

@@ -8,7 +8,7 @@ from typing import TypeVar
 from shoal.engines.contract import Engine
 from shoal.engines.known import ENGINES
 from shoal.errors import InputError
-from shoal.scene import GROUND, Coupling, Function, Joint, Load, PointMass, Rod, Scene
+from shoal.scene import GROUND, Coupling, Function, Joint, Load, PointMass, Rod, Scene, SignalFunction
 from shoal.scene.joints import places
 
 T = TypeVar("T")
@@ -22,6 +22,7 @@ FEATURES = (
     "starts at rest",
     "starts at the end of a run",
     "functions of time",
+    "signals",
     "varying distances",
     "dry friction",
     "quadratic drag",
@@ -102,7 +103,9 @@ def _item(where: str, item: Joint | Load) -> Iterator[tuple[str, str]]:
             yield f"{where}.stick", "exact stick"
         if field in _FIELDS and value:
             yield f"{where}.{field}", _FIELDS[field]
-        if isinstance(value, Function) and (value.number is None or field == "elastic"):
+        if isinstance(value, SignalFunction) and not value.of_time:
+            yield f"{where}.{field}", "signals"
+        elif isinstance(value, Function) and (value.number is None or field == "elastic"):
             yield f"{where}.{field}", _LAWS.get(field, "functions of time")
 
 

@@ -10,7 +10,7 @@ from numba import njit, typeof, types
 from shoal.compile import function_pointers, simd, structures
 from shoal.compile.pointers import pointer, raw, shift
 from shoal.compile.vector import clear
-from shoal.mechanics import applied, constraints, forces, gaps, rubbing
+from shoal.mechanics import applied, constraints, forces, gaps, rubbing, signals
 from shoal.mechanics.derived import Derived, derive, fold
 from shoal.mechanics.elements.families import LAID
 from shoal.mechanics.least import principle
@@ -36,7 +36,7 @@ class Work(NamedTuple):
     continuous angle of every force element, (forces, lanes). power: dissipated minus supplied power
     [W], (lanes,). energy: kinetic, elastic, potential, elastic of the bodies alone [J], (4, lanes). until: the last
     instant [s] before functions of time may jump, (1,); later times are replaced by it. rubbing: of
-    friction by joint forces.
+    friction by joint forces. signals: see `signals.room`.
     """
 
     storage: Array
@@ -53,6 +53,7 @@ class Work(NamedTuple):
     gauss: least.GaussWork
     rubbing: Array
     gaps: gaps.GapWork
+    signals: Array
 
 
 def work_space(tile: Tile, m: Arrays) -> Work:
@@ -86,6 +87,7 @@ def work_space(tile: Tile, m: Arrays) -> Work:
         least.work_space(width, m),
         rubbing.room(width, m.rows, m.rubbing.size),
         gaps.room(width, m.gaps, m.unknowns, m.rows, m.constraints.size),
+        signals.room(m.followed, width),
     )
 
 
@@ -120,6 +122,7 @@ def loaded(m: Arrays) -> bool:
         m.driven
         or m.forces.size + a.fixed + a.following + a.turning + a.twisting > 0
         or m.damped
+        or m.table.signals != 0
         or m.gaps.tangents > 0
         or m.gives
     )
@@ -139,6 +142,8 @@ def force(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, f: Ar
         if moving:
             derive(tile, m.derived, zdot, m.unknowns, m.force_rows, True)
             applied.add_force(tile, m.applied, m.functions, t, z, zdot, f, w.power)
+            if m.table.signals != 0:
+                signals.follow(tile, m, w, t, z, zdot, f, signals.ACT)
         forces.add_force(tile, m.forces, m.functions, t, z, zdot, w.memory, f, w.element, w.power, moving)
     _add_elements(tile, m, w, z, zdot, f, part)
 
@@ -258,6 +263,9 @@ def remember(tile: Tile, m: Arrays, w: Work) -> None:
     if m.forces.size > 0:
         derive(tile, m.derived, w.z, m.unknowns, m.force_rows, False)
         forces.remember(tile, m.forces, w.z, w.memory)
+    if m.table.signals != 0:
+        derive(tile, m.derived, w.z, m.unknowns, m.force_rows, False)
+        signals.follow(tile, m, w, 0.0, w.z, w.zdot, w.z, signals.REMEMBER)
     if m.gaps.size > 0:
         derive(tile, m.derived, w.z, m.unknowns, m.force_rows, False)
         forces.remember(tile, m.gaps.measures, w.z, w.gaps.memory)

@@ -160,7 +160,7 @@ def remember(tile: Tile, forces: Forces, z: Array, memory: Array) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def _gradient(tile: Tile, forces: Forces, number: int, z: Array, w: Array) -> None:
+def gradient(tile: Tile, forces: Forces, number: int, z: Array, w: Array) -> None:
     """Coordinates, dg/dz and, but for the turns of an angle, g of an element into w."""
     width, d, rows = len(tile), forces.dimensions, side(forces)
     kind = forces.kind[number]
@@ -200,9 +200,9 @@ def _gradient(tile: Tile, forces: Forces, number: int, z: Array, w: Array) -> No
 
 @njit(cache=True, error_model="numpy")
 def measure(tile: Tile, forces: Forces, number: int, z: Array, memory: Array, w: Array) -> None:
-    """Compute `_gradient` with x = g - g0 in place of g."""
+    """Compute `gradient` with x = g - g0 in place of g."""
     width, d = len(tile), forces.dimensions
-    _gradient(tile, forces, number, z, w)
+    gradient(tile, forces, number, z, w)
     natural, row = (LAW * number + NATURAL) * width, value_row(forces) * width
     for lane in range(width):
         value = w[row + lane]
@@ -388,7 +388,7 @@ def damping(tile: Tile, forces: Forces, z: Array, zdot: Array, w: Array, out: Ar
     """Damping -dF/dzdot, [c + 2 c2 |g'| + F_c/v_s sech^2(g'/v_s)] dg/dz dg/dz', in blocks as in `tangent`. Pointers."""
     width, rows = len(tile), side(forces)
     for number in range(forces.size):
-        _gradient(tile, forces, number, z, w)
+        gradient(tile, forces, number, z, w)
         slip(tile, forces, number, zdot, w)
         law = LAW * number * width
         start = (first + rows * rows * number) * width

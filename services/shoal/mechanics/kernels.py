@@ -21,7 +21,7 @@ from shoal.compile import function_pointers, locks
 from shoal.compile.function_pointers import call
 from shoal.compile.pointers import raw_type
 from shoal.compile.structures import Reference, storage
-from shoal.mechanics import dynamics
+from shoal.mechanics import dynamics, signals
 from shoal.mechanics.contact import decision, motion, response
 from shoal.mechanics.dynamics import ACCELERATION, ALL, ELASTIC, SIMPLE, Work, instant
 from shoal.mechanics.elements import families
@@ -213,13 +213,21 @@ _READY: dict[tuple[Any, ...], FunctionTable] = {}
 def ready(tile: Tile, arrays: Arrays, room: Work) -> Arrays:
     """Return the same arrays with storage of their own and pointers to the kernels that they call."""
     acting = tuple(type(family) if family.size > 0 else None for family in arrays.elements)
-    key = len(tile), arrays.constraints.size > 0, arrays.gaps.size > 0, acting
+    key = len(tile), arrays.constraints.size > 0, arrays.gaps.size > 0, bool(arrays.followed), acting
     if key not in _READY:
         wanted = _wanted(tile, arrays)
         state = [_address(name, tile, arrays, room) if name in wanted else 0 for name in _STATE_KERNELS]
+        state.append(signals_address(tile, arrays, room))
         pointers = (family_pointers(name, tile, arrays.elements) for name in ("force", "energy", "mean"))
         _READY[key] = FunctionTable._make([*state, len(acting), *pointers, 0])
     return arrays._replace(storage=storage(), table=_READY[key])
+
+
+def signals_address(tile: Tile, arrays: Arrays, room: Work) -> int:
+    """Return where the kernel of signals is, 0 of a machine without any."""
+    if not arrays.followed:
+        return 0
+    return address(("signals", len(tile)), lambda: signals.kernel(tile, arrays.followed, seen(arrays), room))
 
 
 def family_pointers(name: str, tile: Tile, elements: tuple[Any, ...]) -> Index:
@@ -237,6 +245,7 @@ def signatures(tile: Tile, arrays: Arrays, room: Work, *, every: bool = False) -
     every: the kernels of any model
     """
     found = [_kernel(name, tile, arrays, room) for name in (_USUAL if every else _wanted(tile, arrays))]
+    found += [signals.kernel(tile, arrays.followed, seen(arrays), room)] if arrays.followed else []
     elements = [family for family in arrays.elements if every or family.size > 0]
     return found + [_kernel(name, tile, one) for name in _FAMILY_KERNELS for one in elements if _has(name, one)]
 

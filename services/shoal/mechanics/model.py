@@ -33,6 +33,7 @@ from shoal.mechanics.numerics.row_pairs import paired
 from shoal.mechanics.numerics.tile import SINGLE, Array, Flags, Index, Tile, pack, packed, stacked, varies
 from shoal.mechanics.rubbing import Rubbing
 from shoal.mechanics.saddle import Saddle
+from shoal.mechanics.signals import Signals
 from shoal.scene import Scene
 from shoal.scene.joints import places
 
@@ -53,6 +54,7 @@ class FunctionTable(NamedTuple):
     contact: int
     hold: int
     decide: int
+    signals: int
     families: int
     force: Index
     energy: Index
@@ -66,7 +68,8 @@ class Arrays(NamedTuple):
     method, baumgarte: how accelerations are found. mass_factor, mass_root: of the regularised mass matrix; lent: the
     mass added to flat bodies, empty where none is; refinements: iterations that compensate it, see `least.lent`.
     families: the elements as kernels read them, `families.lay`. alike: the mass matrix where all lanes have the same
-    one. elements: one structure a family; kernels do not see them, see `seen`.
+    one. elements: one structure a family; followed: the signals, and `signals` as their kernel reads them; kernels do
+    not see elements and followed, see `seen`.
     """
 
     storage: Array
@@ -99,12 +102,14 @@ class Arrays(NamedTuple):
     applied: Applied
     gaps: Gaps
     families: Array
+    signals: Array
     elements: tuple[Any, ...]
+    followed: Any
 
 
 def seen(arrays: Arrays) -> Arrays:
     """Return what kernels see, which has one type for all models: families of elements are called by addresses."""
-    return arrays._replace(elements=())
+    return arrays._replace(elements=(), followed=())
 
 
 @njit(cache=True)
@@ -118,8 +123,8 @@ class Model:
 
     q0, v0: initial coordinates and rates, (unknowns, lanes). Arrays of lane-dependent numbers are
     (rows, lanes) or (rows, 1). start_angles: relative angles at the start that angle forces count
-    their turns from [rad], (forces, lanes) or (forces, 1); gap_angles: the same of gaps, (gaps, lanes) or (gaps, 1);
-    gap_fields: what states them. kinks: of every function, where it or a derivative jumps.
+    their turns from [rad], (forces, lanes) or (forces, 1); gap_angles, signal_angles: the same of gaps and of signals;
+    gap_fields, signal_fields: what states them. kinks: of every function, where it or a derivative jumps.
     owners: for each family of elements the body of every element. failed: lanes whose start contradicts the joints,
     (lanes,) or (1,). frames: kinematics of the bodies. mass_entries, lent_entries, stretching_entries: the lower
     triangles of the mass matrix, of the mass added to thin bodies, and of the rods' stiffness against stretching, see
@@ -161,6 +166,9 @@ class Model:
     method: int
     baumgarte: float
     rubbing: Rubbing
+    signals: Signals | tuple[()]
+    signal_angles: Array
+    signal_fields: tuple[str, ...]
     slowed: int = 0
     marker_angles: Array | None = None
     shared_tiles: dict[int, Arrays] = field(default_factory=dict, compare=False, repr=False)
@@ -170,7 +178,7 @@ class Model:
     def varies(self) -> bool:
         """Return whether lanes differ in more than their initial state."""
         parts = self.derived, self.elements, self.forces, self.applied, self.gaps, self.constraints, self.rubbing
-        return varies((self.mass_values, self.weight, *parts))
+        return varies((self.mass_values, self.weight, *parts, self.signals))
 
     @property
     def unknowns(self) -> int:
@@ -297,9 +305,10 @@ class Model:
         parts = self.functions, self.constraints, self._saddle, self.rubbing, self.dimensions
         elements, nobody = packed(self.elements, lanes, tile), np.zeros(len(self.elements), dtype=np.int64)
         own: tuple[Any, ...] = packed((*parts, self.forces, self.applied, self.gaps), lanes, tile)
+        followed = packed(self.signals, lanes, tile)
         return Arrays(
             structures.storage(),
-            FunctionTable(0, 0, 0, 0, 0, 0, 0, 0, 0, len(nobody), nobody, nobody, nobody),
+            FunctionTable(0, 0, 0, 0, 0, 0, 0, 0, 0, 0, len(nobody), nobody, nobody, nobody),
             self.unknowns,
             self.force_rows,
             self.held_rows,
@@ -319,8 +328,17 @@ class Model:
             REFINEMENTS if self.flat else 0,
             self._alike,
             pack(self.weight, lanes, tile),
-            *(*own, lay(elements), elements),
+            *(*own, lay(elements), _laid(followed), elements, followed),
         )
+
+
+def _laid(structure: Any) -> Array:
+    """Write a structure as kernels read it; nothing for none. Its arrays must outlive the use."""
+    if not structure:
+        return np.zeros(0)
+    place = structures.storage()
+    structures.write(place, structure)
+    return place
 
 
 def _equal(one: Any, other: Any) -> bool:
@@ -337,7 +355,19 @@ def _equal(one: Any, other: Any) -> bool:
     return bool(one == other)
 
 
-_OF_START = ("scene", "stated", "failed", "frames", "lanes", "q0", "v0", "start_angles", "gap_angles", "marker_angles")
+_OF_START = (
+    "scene",
+    "stated",
+    "failed",
+    "frames",
+    "lanes",
+    "q0",
+    "v0",
+    "start_angles",
+    "gap_angles",
+    "signal_angles",
+    "marker_angles",
+)
 """Fields of a model that its start decides, with the frames, whose numbers its arrays hold."""
 REFINEMENTS = 4
 """Each leaves the part `masses.THIN` of what there was to take back, so that round-off is left."""

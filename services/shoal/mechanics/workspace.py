@@ -46,6 +46,10 @@ def put_at_start(model: Model, tile: Tile, part: slice, arrays: Arrays, room: Wo
     if model.forces.size:
         derived_rows(tile, arrays, room)
         room.memory[:] = forces.initial_memory(tile, arrays.forces, room.z, pack(model.start_angles, part, tile))
+    if followed := arrays.followed:
+        derived_rows(tile, arrays, room)
+        start = pack(model.signal_angles, part, tile)
+        room.signals[: start.size] = forces.initial_memory(tile, followed.measures, room.z, start)
     if model.gaps.size:
         derived_rows(tile, arrays, room)
         start = pack(model.gap_angles, part, tile)

@@ -2,7 +2,7 @@
 
 from shoal.scene.bodies import FRAMED, Body, Rod
 from shoal.scene.contacts import Contact, ContactSurface
-from shoal.scene.function import Function
+from shoal.scene.function import Function, SignalFunction
 from shoal.scene.initial import InitialState
 from shoal.scene.joints import (
     GROUND,
@@ -62,6 +62,7 @@ __all__ = [
     "RigidBody",
     "Rod",
     "Scene",
+    "SignalFunction",
     "Slider",
     "Solver",
     "Spherical",

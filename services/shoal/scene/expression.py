@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import ast
 import math
+import re
 import warnings
 from collections.abc import Callable, Mapping
 from functools import lru_cache, reduce
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -48,14 +50,46 @@ BINARY: dict[type[ast.operator], Callable[[Number, Number], Number]] = {
     ast.Pow: np.power,
 }
 _PLAIN = (ast.Expression, ast.Name, ast.BinOp, ast.UnaryOp, ast.UAdd, ast.USub, ast.Load, *BINARY)
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
+_SUCH = {1: "hinge", 2: "tip, x"}
 _LONGEST = 500
 _DEEPEST = 100
 
 
-def names(text: str) -> set[str]:
-    """Names an expression needs a value for (not `pi`, `e`, functions). Raises InputError if it is not arithmetic."""
-    used = {node.id for node in ast.walk(parse(text)) if isinstance(node, ast.Name)}
+NONE: Mapping[str, int] = MappingProxyType({})
+
+
+def names(text: str, measures: Mapping[str, int] = NONE) -> set[str]:
+    """Names an expression needs a value for (not `pi`, `e`, functions). Raises InputError if it is not arithmetic.
+
+    measures: further functions, whose arguments are names of parts and no values, with the number of these
+    """
+    used: set[str] = set()
+    ahead: list[ast.AST] = [parse(text, measures)]
+    while ahead:
+        node = ahead.pop()
+        if isinstance(node, ast.Name):
+            used.add(node.id)
+        ahead += () if measured(node, measures) else ast.iter_child_nodes(node)
     return used - {*ONE, *MANY, *_CONSTANTS}
+
+
+def measured(node: ast.AST, measures: Mapping[str, int]) -> tuple[str, ...]:
+    """Return the name and the arguments of a measure; nothing for any other part of an expression."""
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in measures:
+        return node.func.id, *(_part(argument) for argument in node.args)
+    return ()
+
+
+def _part(node: ast.AST) -> str:
+    """Return the name of a part of a scene, in quotes or not (left-hinge reads like a difference); else nothing."""
+    pieces: list[ast.AST] = []
+    while isinstance(node, ast.BinOp) and isinstance(node.op, ast.Sub):
+        pieces.append(node.right)
+        node = node.left
+    pieces.append(node)
+    names = [getattr(piece, "id", getattr(piece, "value", "")) for piece in reversed(pieces)]
+    return "-".join(str(name) if isinstance(name, str | int) else "" for name in names)
 
 
 def evaluate(text: str, values: Mapping[str, float]) -> float:
@@ -70,9 +104,13 @@ def evaluate_array(text: str, values: Mapping[str, Number]) -> Number:
     return np.where(np.isfinite(value), value, np.nan)
 
 
+def parse(text: str, measures: Mapping[str, int] = NONE) -> ast.Expression:
+    """The syntax tree of an expression. Raises InputError if it is not arithmetic; measures: see `names`."""
+    return _parsed(text, tuple(measures.items()))
+
+
 @lru_cache(maxsize=256)
-def parse(text: str) -> ast.Expression:
-    """The syntax tree of an expression. Raises InputError if it is not arithmetic."""
+def _parsed(text: str, measures: tuple[tuple[str, int], ...]) -> ast.Expression:
     if len(text) > _LONGEST:
         raise InputError(f"expression: longer than {_LONGEST} characters")
     try:
@@ -80,17 +118,19 @@ def parse(text: str) -> ast.Expression:
             tree = ast.parse(text.strip(), mode="eval")
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise InputError(f"expression: {text!r} is not arithmetic") from None
-    _check(tree, text)
+    _check(tree, text, dict(measures))
     return tree
 
 
-def _check(tree: ast.Expression, text: str) -> None:
+def _check(tree: ast.Expression, text: str, measures: Mapping[str, int]) -> None:
     """Refuse all but arithmetic, level by level, so that the rest is shallow enough for recursion."""
     level: list[ast.AST] = [tree]
     for _ in range(_DEEPEST):
         inner: list[ast.AST] = []
         for node in level:
-            if isinstance(node, ast.Call):
+            if (found := measured(node, measures)) and isinstance(node, ast.Call):
+                _check_measure(found, node, measures[found[0]])
+            elif isinstance(node, ast.Call):
                 _check_call(node, text)
                 inner += node.args
             else:
@@ -120,6 +160,15 @@ def _check_call(node: ast.Call, text: str) -> None:
         raise InputError(f"expression: {text!r} calls what is none of {', '.join([*ONE, *MANY])}")
     if node.keywords or (len(node.args) != 1 if name in ONE else len(node.args) < 2):
         raise InputError(f"expression: {name} takes {'one number' if name in ONE else 'two numbers or more'}")
+
+
+def _check_measure(found: tuple[str, ...], node: ast.Call, count: int) -> None:
+    name, *parts = found
+    if node.keywords or len(parts) != count or not all(map(_NAME.fullmatch, parts)):
+        wanted = "the name of a part" if count == 1 else "two names"
+        raise InputError(
+            f"expression: {name}({', '.join(parts)}): {name} takes {wanted}, such as {name}({_SUCH[count]})"
+        )
 
 
 def _value(node: Any, values: Mapping[str, Number]) -> Number:

@@ -1,12 +1,15 @@
 """An expression in the time t as a small tree: numbers, the string "t", and tuples (operation, argument, ...).
 
-Trees are hashable, so that equal parts are seen to be equal; what holds no t is one number.
+Trees are hashable, so that equal parts are seen to be equal; what holds no t is one number. Leaves of formulas that are
+no functions of time alone are names of signals and measures of the machine.
 """
 
 from __future__ import annotations
 
 import ast
 import math
+from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import lru_cache, reduce
 from typing import Any
 
@@ -16,7 +19,25 @@ from shoal.errors import InputError
 from shoal.scene import expression
 
 Node = Any
-"""A float, "t", or a tuple of an operation of OPERATIONS and its arguments."""
+"""A float, "t", or a tuple of an operation of OPERATIONS and its arguments; a name or a `Measure`."""
+
+MEASURES = {
+    **dict.fromkeys(("angle", "rate", "slide", "slide_rate"), 1),
+    **dict.fromkeys(("distance", "distance_rate", "position", "velocity"), 2),
+}
+"""Measures of the machine that a formula may call, with the number of names that they take."""
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A measure of the machine: its kind, of MEASURES, and the names of parts that it takes."""
+
+    kind: str
+    names: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return f"{self.kind}({', '.join(self.names)})"
+
 
 _SIGNS: dict[type[ast.operator], str] = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**"}
 _CONSTANTS = {"pi": math.pi, "e": math.e}
@@ -33,8 +54,17 @@ OPERATIONS: dict[str, Any] = {
 
 @lru_cache(maxsize=256)
 def tree(text: str) -> Node:
-    """The tree of an expression in t. Raises InputError."""
-    return _tree(expression.parse(text).body)
+    """The tree of an expression in t, signals and measures. Raises InputError."""
+    return _tree(expression.parse(text, MEASURES).body)
+
+
+def leaves(node: Node) -> Iterator[Any]:
+    """Yield the names and measures of a tree, "t" among them."""
+    if isinstance(node, tuple):
+        for argument in node[1:]:
+            yield from leaves(argument)
+    elif not isinstance(node, float):
+        yield node
 
 
 def _tree(node: Any) -> Node:
@@ -47,6 +77,8 @@ def _tree(node: Any) -> Node:
         return make("neg", inner) if isinstance(node.op, ast.USub) else inner
     if isinstance(node, ast.BinOp):
         return make(_SIGNS[type(node.op)], _tree(node.left), _tree(node.right))
+    if measured := expression.measured(node, MEASURES):
+        return Measure(measured[0], measured[1:])
     name, arguments = node.func.id, [_tree(argument) for argument in node.args]
     return make(name, *arguments) if name in expression.ONE else reduce(lambda a, b: make(name, a, b), arguments)
 
@@ -92,7 +124,7 @@ def _value(node: Node, t: Any) -> Any:
 def written(node: Node) -> str:
     """A tree as a user would write it."""
     if not isinstance(node, tuple):
-        return "t" if node == "t" else f"{node:g}"
+        return f"{node:g}" if isinstance(node, float) else str(node)
     operation, *arguments = node
     if operation in _SIGNS.values():
         closed = [isinstance(argument, tuple) and argument[0] in ("+", "-", "neg") for argument in arguments]

@@ -6,7 +6,7 @@ import math
 import re
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -48,6 +48,8 @@ class Function(Record):
     @model_validator(mode="before")
     @classmethod
     def _short_forms(cls, data: Any) -> Any:
+        if isinstance(data, Function) and not isinstance(data, cls):
+            data = data.model_dump()
         if isinstance(data, str):
             # What `--set` gives is text.
             return {"number": float(data)} if _NUMBER.fullmatch(data.strip()) else {"expression": data}
@@ -58,20 +60,27 @@ class Function(Record):
                 f"{str(data['path'])[:80]!r} is read from beside the YAML file of a scene; here state its table"
             )
         if not isinstance(data, dict | Function):
-            raise ValueError('a function of time is a number, an expression such as "0.1*sin(3*t)", or a table')
+            raise ValueError(f'{cls._what} is a number, an expression such as "{cls._such}", or a table')
         return data
+
+    _what: ClassVar[str] = "a function of time"
+    _such: ClassVar[str] = "0.1*sin(3*t)"
 
     @field_validator("expression")
     @classmethod
     def _in_time(cls, text: str | None) -> str | None:
         if text is not None:
             try:
-                unknown = arithmetic.names(text) - {"t"}
+                unknown = cls._unknown(text)
             except InputError as error:
                 raise ValueError(str(error).removeprefix("expression: ")) from None
             if unknown:
                 raise ValueError(f"{text!r} has {sorted(unknown)[0]!r}, which is not known; the time is `t`")
         return text
+
+    @classmethod
+    def _unknown(cls, text: str) -> set[str]:
+        return arithmetic.names(text) - {"t"}
 
     @field_validator("table")
     @classmethod
@@ -186,6 +195,26 @@ class Function(Record):
         return CubicSpline(*np.array(self.table).T)
 
 
+class SignalFunction(Function):
+    """A function of time t [s], of signals by their names and of measures of the machine such as `angle(hinge)`.
+
+    Written as a function of time is. Its names are looked up by the scene (`signals.check_signals`).
+    """
+
+    _what: ClassVar[str] = "a function of time, measures and signals"
+    _such: ClassVar[str] = "20*error - 2*rate(hinge)"
+
+    @classmethod
+    def _unknown(cls, text: str) -> set[str]:
+        arithmetic.names(text, formula.MEASURES)
+        return set()
+
+    @property
+    def of_time(self) -> bool:
+        """Return whether it is a function of time alone, as it is written."""
+        return all(leaf == "t" for leaf in formula.leaves(self.formula)) if self.expression is not None else True
+
+
 @dataclass(frozen=True)
 class Composed:
     """A function of time and what is done to its value."""
@@ -212,3 +241,15 @@ class Composed:
         for operation in self.operations:
             value = formula.OPERATIONS[operation](value)
         return value
+
+
+@dataclass(frozen=True)
+class Formula:
+    """A function of time by its tree."""
+
+    formula: formula.Node
+    knots: tuple[float, ...] = ()
+
+    def __call__(self, t: Array) -> Array:
+        """See `Function`."""
+        return np.array(np.broadcast_to(formula.value(self.formula, t), np.shape(t)))

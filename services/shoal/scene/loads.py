@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from shoal.scene.function import Function
+from shoal.scene.function import Function, SignalFunction
 from shoal.scene.joints import Attachment, Direction, Z
 from shoal.scene.record import Axis, NonNegative, Record, Vector, kinds
 
@@ -56,7 +56,7 @@ class TorsionSpring(Elastic):
 
 
 class Force(Record):
-    """A force at a place, times a function of time."""
+    """A force at a place, times a function of time and signals."""
 
     kind: Literal["force"] = "force"
     at: Attachment
@@ -65,8 +65,8 @@ class Force(Record):
     """Force along the axes of the ground at the start [N]."""
     follows: bool = False
     """Whether its direction turns with the body."""
-    scale: Function = Function(number=1.0)
-    """Factor as a function of time [1]."""
+    scale: SignalFunction = SignalFunction(number=1.0)
+    """Factor as a function of time and signals [1]."""
 
 
 class Torque(Record):
@@ -75,8 +75,8 @@ class Torque(Record):
     kind: Literal["torque"] = "torque"
     at: Attachment
     """Place on the body."""
-    torque: Function
-    """Torque [N m] as a function of time."""
+    torque: SignalFunction
+    """Torque [N m] as a function of time and signals."""
     axis: Axis = Z
     """Axis of the torque in space, as it points at the start [1]. It turns with the body of `reaction`, and is fixed
     for the ground.
@@ -86,15 +86,15 @@ class Torque(Record):
 
 
 class DistributedForce(Record):
-    """A force per length along a whole rod, fixed in direction, times a function of time."""
+    """A force per length along a whole rod, fixed in direction, times a function of time and signals."""
 
     kind: Literal["distributed-force"] = "distributed-force"
     body: str
     """Name of the rod."""
     force: Vector
     """Force per length along the axes of the ground [N/m]."""
-    scale: Function = Function(number=1.0)
-    """Factor as a function of time [1]."""
+    scale: SignalFunction = SignalFunction(number=1.0)
+    """Factor as a function of time and signals [1]."""
 
 
 Load = Annotated[Spring | TorsionSpring | Force | Torque | DistributedForce, Field(discriminator="kind")]

@@ -16,7 +16,7 @@ from shoal.shelf import LARGEST
 from shoal.table_units import SI, TIMES, AngleUnit, ForceUnit, LengthUnit, TorqueUnit, Units
 
 PARTS = ("joints", "loads", "ground_points")
-"""Parts of a scene whose members have functions of time: PART.NAME.FIELD."""
+"""Parts of a scene whose members have functions of time: PART.NAME.FIELD; those of signals are functions themselves."""
 _LENGTHS = ("a length", {unit: SI[unit] for unit in get_args(LengthUnit) if unit != "px"})
 _MEASURES: Mapping[str, tuple[str, Mapping[str, float]]] = {
     "angle": ("an angle", {unit: SI[unit] for unit in get_args(AngleUnit)}),
@@ -102,7 +102,8 @@ def with_signals(data: Any, folder: Path, source: str) -> Any:
     """The fields of a scene with the signals that they name as tables. Raises InputError, one line with the field."""
     for path, field, stated in signals(data):
         try:
-            field[path[-1]] = Signal.model_validate(stated).table(folder, path[-1])
+            quantity = path[-1] if path[0] in PARTS else ""
+            field[path[-1]] = Signal.model_validate(stated).table(folder, quantity)
         except ValidationError as error:
             raise one_line(error, f"{source}: {'.'.join(path)}", Signal) from None
         except InputError as error:
@@ -110,7 +111,7 @@ def with_signals(data: Any, folder: Path, source: str) -> Any:
     return data
 
 
-def signals(data: Any) -> Iterator[tuple[tuple[str, str, str], dict[str, Any], dict[str, Any]]]:
+def signals(data: Any) -> Iterator[tuple[tuple[str, ...], dict[str, Any], dict[str, Any]]]:
     """Yield the signals in the fields of a scene: the path, the mapping that holds the field, and the field."""
     for part in PARTS:
         members = data.get(part) if isinstance(data, dict) else None
@@ -118,3 +119,8 @@ def signals(data: Any) -> Iterator[tuple[tuple[str, str, str], dict[str, Any], d
             for field, value in member.items() if isinstance(member, dict) else ():
                 if isinstance(value, dict) and "path" in value:
                     yield (part, str(name), str(field)), member, value
+    stated = data.get("signals") if isinstance(data, dict) else None
+    of_scene: dict[str, Any] = stated if isinstance(stated, dict) else {}
+    for name, value in of_scene.items():
+        if isinstance(value, dict) and "path" in value:
+            yield ("signals", str(name)), of_scene, value

@@ -65,7 +65,7 @@ def lanes_of(part: Any) -> int:
 
 def shared(place: Any, path: list[str]) -> bool:
     """Return whether lanes cannot differ in the number at a path: it lies in a function of time, or in a list of
-    lists.
+    lists. They can in a signal that is a number.
     """
     for part, below in zip(path, [*path[1:], ""], strict=True):
         if isinstance(place, Mapping):
@@ -77,7 +77,7 @@ def shared(place: Any, path: list[str]) -> bool:
         else:
             place = getattr(place, part, None)
         if isinstance(place, Function):
-            return True
+            return path != ["signals", part] or place.number is None
     return False
 
 

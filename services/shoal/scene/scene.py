@@ -21,7 +21,7 @@ from shoal.scene.contacts import Contact, check_contacts
 from shoal.scene.dimensions import Dimensions, check_dimensions, padded
 from shoal.scene.ended import End
 from shoal.scene.expect import Expectation, ExpectedValue
-from shoal.scene.function import Function
+from shoal.scene.function import Function, SignalFunction
 from shoal.scene.initial import (
     FROM,
     INITIAL,
@@ -38,6 +38,7 @@ from shoal.scene.joints import GROUND, Attachment, Joint, MovingPoint, Universal
 from shoal.scene.loads import DistributedForce, Force, Load
 from shoal.scene.paths import key, parts, shared, unknown, unwrapped, with_lanes
 from shoal.scene.record import Record, Vector, one_line
+from shoal.scene.signals import check_signals
 from shoal.scene.solids import ModalBody
 from shoal.scene.solver import Solver
 
@@ -46,6 +47,8 @@ _FEW = 4
 _SHAPES = ("length", "curvature", "side_curvature", "twist", "named_points")
 """Fields of a body that place its joints."""
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")]
+SignalName = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
+"""A name in a formula, where a hyphen is a minus."""
 
 
 class Scene(Record):
@@ -71,6 +74,8 @@ class Scene(Record):
     """Contacts between bodies by name."""
     loads: dict[Name, Load] = {}
     """Loads by name."""
+    signals: dict[SignalName, SignalFunction] = {}
+    """Signals by name: formulas of time, measures of the machine and other signals, which loads may follow."""
     ground_points: dict[Name, MovingPoint] = {}
     """Moving points of the ground by name."""
     markers: Annotated[dict[Name, Attachment], Field(min_length=1)]
@@ -112,6 +117,7 @@ class Scene(Record):
         parts += [
             _counted("contact", "contacts", self.contacts),
             _counted("load", "loads", self.loads),
+            _counted("signal", "signals", self.signals),
             _counted("marker", "markers", self.markers),
         ]
         return f"Scene({self.name}: {'; '.join(part for part in parts if part)})"
@@ -161,6 +167,7 @@ class Scene(Record):
         check_dimensions(self)
         check_clearances(self)
         check_contacts(self, contacts_of(self))
+        check_signals(self)
         placed = self._placed()
         loose = [name for name in self.bodies if name not in placed]
         if loose:

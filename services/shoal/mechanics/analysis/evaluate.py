@@ -74,6 +74,11 @@ class Evaluator:
                 f"{model.gap_fields[0]}: motions, equilibria and modes take one-sided constraints, but not yet "
                 "reactions, virtual sensors, steady motions and starts from the end of a run"
             )
+        if model.signals:
+            raise InputError(
+                f"{model.signal_fields[0]}: follows signals, which runs know, but not yet equilibria, modes, "
+                "reactions, virtual sensors and steady motions"
+            )
         self.model = model
         self._arrays = model.tile(SINGLE, slice(lane, lane + 1))
         self._room = work_space(SINGLE, self._arrays)

@@ -9,8 +9,9 @@ from shoal.errors import InputError
 from shoal.mechanics import fitting, functions, terms
 from shoal.mechanics.assembly.contacts import Contacts
 from shoal.mechanics.assembly.coordinates import Placement
-from shoal.mechanics.assembly.loads import Loads, naming
+from shoal.mechanics.assembly.loads import Loads
 from shoal.mechanics.assembly.masses import Masses
+from shoal.mechanics.assembly.measures import naming
 from shoal.mechanics.assembly.placement import place
 from shoal.mechanics.derived import RowAllocator
 from shoal.mechanics.least import principle
@@ -19,6 +20,7 @@ from shoal.mechanics.numerics.tile import index, stacked
 from shoal.mechanics.reach import span
 from shoal.mechanics.rubbing import Rubbing
 from shoal.scene import GROUND, Distance, Scene
+from shoal.scene.signals import following
 
 
 def with_start(model: Model, scene: Scene, lanes: int) -> Model:
@@ -26,6 +28,7 @@ def with_start(model: Model, scene: Scene, lanes: int) -> Model:
     placement = place(scene)
     stated, scene = scene, placement.scene
     contacts = Contacts(scene, placement, RowAllocator(0))
+    loads = Loads(scene, placement, RowAllocator(0), 0.0)
     return replace(
         model,
         scene=scene,
@@ -34,7 +37,8 @@ def with_start(model: Model, scene: Scene, lanes: int) -> Model:
         lanes=lanes,
         q0=stacked(placement.positions),
         v0=stacked(placement.velocities),
-        start_angles=stacked(Loads(scene, placement, RowAllocator(0), 0.0).angles),
+        start_angles=stacked(loads.angles),
+        signal_angles=stacked(loads.signals.measures.angles),
         gap_angles=stacked(contacts.angles),
     )
 
@@ -105,6 +109,9 @@ def build(scene: Scene, lanes: int = 1, horizon: float = 0.0, placement: Placeme
         constraint_names=tuple(one.name for one in placement.terms.held),
         marker_rows=index(marker_rows),
         rubbing=_rubbing(loads, placement.terms.pressed),
+        signals=loads.followed(),
+        signal_fields=tuple(following(stated)),
+        signal_angles=stacked(loads.signals.measures.angles),
         method=principle.method(scene.solver.acceleration),
         baumgarte=scene.solver.baumgarte,
     )

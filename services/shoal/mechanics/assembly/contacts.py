@@ -11,7 +11,7 @@ import numpy as np
 from shoal.errors import InputError
 from shoal.mechanics.affine import Affine, fixed
 from shoal.mechanics.assembly.coordinates import Placement
-from shoal.mechanics.assembly.loads import ElementForceLaw, Measures
+from shoal.mechanics.assembly.measures import ElementForceLaw, Measures
 from shoal.mechanics.derived import RowAllocator
 from shoal.mechanics.forces import DISTANCE, LAW, NATURAL, PLACE
 from shoal.mechanics.frames import RigidFrame

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -13,149 +12,35 @@ from shoal.mechanics import fitting, plane
 from shoal.mechanics.affine import Affine, fixed
 from shoal.mechanics.applied import Applied
 from shoal.mechanics.assembly.coordinates import Placement
-from shoal.mechanics.assembly.groups import start_angle
+from shoal.mechanics.assembly.measures import ElementForceLaw, Measures, naming
 from shoal.mechanics.assembly.rods import rod_axis
+from shoal.mechanics.assembly.signals import SignalLoads
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
 from shoal.mechanics.assembly.space.hinges import axis_of, turning
 from shoal.mechanics.derived import RowAllocator
-from shoal.mechanics.forces import ANGLE, DISTANCE, PLACE, Forces
+from shoal.mechanics.forces import ANGLE, DISTANCE, PLACE
 from shoal.mechanics.frames import BeamFrame, ModalFrame, RigidFrame
-from shoal.mechanics.functions import Piecewise
 from shoal.mechanics.numerics.tile import Number, index, stacked
 from shoal.mechanics.reach import span
+from shoal.mechanics.signals import Signals
 from shoal.scene import (
     GROUND,
     Attachment,
     DistributedForce,
     Force,
-    Function,
-    PointMass,
     Revolute,
     Rod,
     Scene,
+    SignalFunction,
     Slider,
     Spring,
     Torque,
     TorsionSpring,
 )
 from shoal.scene.dimensions import padded
-from shoal.scene.record import Vector3
 
-
-class ElementForceLaw(NamedTuple):
-    """The force of an element along its measure g, F = -[k x + k3 x^3] - [(c + c2 |g'|) g' + F_c tanh(g'/v_s)] + A.
-
-    x = g - g0, A times the element's drive where it has one. Numbers, or one for each lane, in the order in which
-    `forces.Forces` holds them. stiffness: k; cubic: k3; damping: c; natural: g0; coulomb: F_c; speed: v_s, positive;
-    amplitude: A, of a drive; drag: c2.
-    """
-
-    stiffness: Number = 0.0
-    cubic: Number = 0.0
-    damping: Number = 0.0
-    natural: Number = 0.0
-    coulomb: Number = 0.0
-    speed: Number = 1.0
-    amplitude: Number = 0.0
-    drag: Number = 0.0
-
-
-@contextmanager
-def naming(field: str) -> Iterator[None]:
-    """Name the field in what is said of its function."""
-    try:
-        yield
-    except InputError as error:
-        raise InputError(f"{field}: {str(error).removeprefix('function: ')}") from None
-
-
-class Measures:
-    """Scalar measures of a machine and their laws, in the order of the arrays of `forces.Forces`."""
-
-    def __init__(self, scene: Scene, placement: Placement, rows: RowAllocator, horizon: float) -> None:
-        self.scene, self.placement, self.rows, self.horizon = scene, placement, rows, horizon
-        self.fitted: list[Piecewise] = []
-        self.kinds: list[int] = []
-        self.names: list[str] = []
-        """Of the joint, the load or the body that every element is part of."""
-        self.places: list[list[int]] = []
-        self.numbers: list[list[int]] = []
-        self.laws: list[Number] = []
-        self.angles: list[Number] = []
-
-    def _measure(
-        self,
-        name: str,
-        kind: int,
-        vectors: list[Affine],
-        law: ElementForceLaw,
-        angle: Number,
-        *,
-        elastic: Function | None = None,
-        drive: Function | None = None,
-    ) -> None:
-        table = energy = -1
-        if elastic is not None and self.horizon > 0.0:
-            with naming(self._field(name, elastic)):
-                fitted = fitting.fit_law(elastic)
-            self.fitted += [fitting.ended(one) for one in (fitted, fitting.antiderivative(fitted))]
-            table, energy = len(self.fitted) - 2, len(self.fitted) - 1
-        driven = -1
-        if drive is not None and self.horizon > 0.0:
-            with naming(self._field(name, drive)):
-                self.fitted.append(fitting.fit(drive, self.horizon, drive.knots))
-            driven = len(self.fitted) - 1
-        vectors = [*vectors, *vectors[-1:] * (3 - len(vectors))]
-        self.kinds.append(kind)
-        self.names.append(name)
-        self.places.append(self.rows.of_all(vectors))
-        self.numbers.append([table, energy, driven])
-        self.laws += law
-        self.angles.append(angle)
-
-    def _angle(
-        self,
-        name: str,
-        first: Attachment,
-        second: Attachment,
-        law: ElementForceLaw,
-        axis: Vector3,
-        *,
-        elastic: Function | None = None,
-        drive: Function | None = None,
-    ) -> None:
-        for side in (first, second):
-            self._require_angle(name, side)
-        if isinstance(self.placement, SpatialPlacement):
-            directions = list(turning(self.scene, name, self.placement, first, second, axis))
-            a, b, ahead = (self.placement.start_of(one)[0] for one in directions)
-            turn: Number = np.arctan2(sum(ahead * b), sum(a * b))
-        else:
-            directions = [self.placement.direction(self.scene, side) for side in (first, second)]
-            turn = self._turn(first, second)
-        self._measure(name, ANGLE, directions, law, turn, elastic=elastic, drive=drive)
-
-    def _require_angle(self, name: str, side: Attachment) -> None:
-        if side.body != GROUND and isinstance(self.scene.bodies[side.body], PointMass):
-            raise InputError(
-                f"{name}: {side.body} is a point mass, which has no angle; of a torsion spring, first_to or second_to "
-                "can tell the place to which its direction leads"
-            )
-
-    def _turn(self, first: Attachment, second: Attachment) -> Number:
-        return start_angle(self.scene, second) - start_angle(self.scene, first)
-
-    def _field(self, name: str, function: Function) -> str:
-        """Return the path of a function of a load, or of the load alone if that has made it."""
-        return ".".join([f"loads.{name}", *(field for field, value in self.scene.loads[name] if value is function)])
-
-    def forces(self) -> Forces:
-        """Springs, dampers, friction and torques as arrays."""
-        table, energy, drive = np.array(self.numbers, dtype=np.int64).reshape(-1, 3).T.copy()
-        rows = index(self.places).ravel()
-        return Forces(
-            self.scene.dimensions, len(self.kinds), index(self.kinds), rows, table, energy, drive, stacked(self.laws)
-        )
+FOLLOWED = -2
+"""Loads with this number in place of a function's, and below, follow signals: that of strength k is FOLLOWED - k."""
 
 
 class Loads(Measures):
@@ -165,6 +50,8 @@ class Loads(Measures):
         super().__init__(scene, placement, rows, horizon)
         self.rubbing: list[tuple[str, int, Number]] = []
         """Joints whose friction depends on their force, its element's number, and mu, of a pin times its radius."""
+        measures, torques = (Measures(scene, placement, rows, 0.0) for _ in range(2))
+        self.signals = SignalLoads(measures, torques, self._fit)
         self.fixed: list[tuple[int, Number, int]] = []
         self.following: list[tuple[list[int], Number, int]] = []
         self.turning: list[tuple[list[int], int]] = []
@@ -251,7 +138,11 @@ class Loads(Measures):
             return
         law = ElementForceLaw(amplitude=1.0)
         base = load.reaction or Attachment(body=GROUND, point=(0.0, 0.0))
-        self._angle(name, base, load.at, law, load.axis, drive=load.torque)
+        torque, node = self.signals.resolve(load.torque)
+        if node is None:
+            self._angle(name, base, load.at, law, load.axis, drive=torque)
+        else:
+            self.signals.turn(name, base, load.at, self.signals.strength(f"loads.{name}.torque", node))
 
     def _turn_body(self, name: str, load: Torque, placement: SpatialPlacement) -> None:
         """A torque in space about an axis of the body that takes it, or of the ground."""
@@ -272,9 +163,16 @@ class Loads(Measures):
                     )
                 self.twisting.append((self.rows.of_all([axis * sense, *frame.nodes[node][1:]]), number))
 
-    def _function(self, field: str, f: Function) -> int:
-        """Number of a function of time; -1 for the constant 1."""
-        if f.number == 1.0 or self.horizon == 0.0:
+    def _function(self, field: str, f: SignalFunction) -> int:
+        """Number of a function of time; -1 for the constant 1; of what follows signals see FOLLOWED."""
+        function, node = self.signals.resolve(f)
+        if node is not None:
+            return FOLLOWED - self.signals.strength(field, node)
+        return -1 if f.number == 1.0 else self._fit(field, function)
+
+    def _fit(self, field: str, f: Any) -> int:
+        """Number of a function of time; -1 where its values are not asked for."""
+        if self.horizon == 0.0:
             return -1
         with naming(field):
             self.fitted.append(fitting.fit(f, self.horizon, f.knots))
@@ -324,24 +222,38 @@ class Loads(Measures):
             self._fix(vector, tuple(part * size for part in padded(load.force, self.scene.dimensions)), number)
 
     def applied(self) -> Applied:
-        """Applied loads as arrays."""
-        factors = [part for _, value, _ in self.following for part in value]
+        """Applied loads that are functions of time, as arrays."""
+        return self._applied(lambda number: number if number > FOLLOWED else None)
+
+    def followed(self) -> Signals | tuple[()]:
+        """Signals, and the loads that follow them, as arrays."""
+        return self.signals.signals(
+            lambda register: self._applied(lambda number: register(FOLLOWED - number) if number <= FOLLOWED else None)
+        )
+
+    def _applied(self, number_of: Callable[[int], int | None]) -> Applied:
+        """Applied loads whose functions have a number, by that."""
+        fixed, following, turning, twisting = (
+            [(*one[:-1], number) for one in part if (number := number_of(one[-1])) is not None]
+            for part in (self.fixed, self.following, self.turning, self.twisting)
+        )
+        factors = [part for _, value, _ in following for part in value]
         return Applied(
             self.scene.dimensions,
-            len(self.fixed),
-            index([row for row, _, _ in self.fixed]),
-            stacked([part for _, part, _ in self.fixed]),
-            index([number for _, _, number in self.fixed]),
-            len(self.following),
-            index([rows for rows, _, _ in self.following]).ravel(),
+            len(fixed),
+            index([row for row, _, _ in fixed]),
+            stacked([part for _, part, _ in fixed]),
+            index([number for _, _, number in fixed]),
+            len(following),
+            index([rows for rows, _, _ in following]).ravel(),
             stacked(factors),
-            index([number for _, _, number in self.following]),
-            len(self.turning),
-            index([rows for rows, _ in self.turning]).ravel(),
-            index([number for _, number in self.turning]),
-            len(self.twisting),
-            index([rows for rows, _ in self.twisting]).ravel(),
-            index([number for _, number in self.twisting]),
+            index([number for _, _, number in following]),
+            len(turning),
+            index([rows for rows, _ in turning]).ravel(),
+            index([number for _, number in turning]),
+            len(twisting),
+            index([rows for rows, _ in twisting]).ravel(),
+            index([number for _, number in twisting]),
         )
 
 

@@ -1,0 +1,162 @@
+"""Signals of a scene as measures of the placement and a tape: equal parts of formulas are evaluated once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from shoal.mechanics import tape
+from shoal.mechanics.applied import Applied
+from shoal.mechanics.assembly.measures import ElementForceLaw, Measures
+from shoal.mechanics.forces import DISTANCE, PLACE
+from shoal.mechanics.numerics.tile import Number, index, stacked
+from shoal.mechanics.signals import Signals
+from shoal.scene import GROUND, Attachment, Function, SignalFunction, Slider
+from shoal.scene.formula import Measure, Node
+from shoal.scene.function import Formula
+from shoal.scene.joints import Z
+from shoal.scene.signals import Constant, Table, is_of_time, joint_of, place, written_out
+
+Operand = tuple[str, int]
+"""A register: its section, and its number there."""
+_RATES = {"rate": "angle", "slide_rate": "slide", "distance_rate": "distance"}
+_NO_LAW = ElementForceLaw()
+
+
+class SignalLoads:
+    """Collects what loads follow, and the loads that do.
+
+    fit: returns the number of a function of time, from its field and itself
+    """
+
+    def __init__(self, measures: Measures, torques: Measures, fit: Callable[[str, Any], int]) -> None:
+        self.scene, self.measures, self._torques, self._fit = measures.scene, measures, torques, fit
+        self._turning: list[int] = []
+        self._strengths: list[Operand] = []
+        self._measured: dict[tuple[str, tuple[str, ...]], int] = {}
+        self._rows: dict[str, list[int]] = {"position": [], "velocity": []}
+        self._functions: list[int] = []
+        self._constants: list[Number] = []
+        self._code: list[tuple[int, list[Operand]]] = []
+        self._known: dict[Node, Operand] = {}
+
+    def resolve(self, f: SignalFunction) -> tuple[Any, Node | None]:
+        """Return a function of time, or the tree of what is none."""
+        if f.of_time:
+            return f, None
+        node = written_out(self.scene, f)
+        if isinstance(node, Table):
+            return self.scene.signals[node.name], None
+        if isinstance(node, float):
+            return Function(number=node), None
+        return (Formula(node), None) if is_of_time(node) else (None, node)
+
+    def strength(self, field: str, node: Node) -> int:
+        """Return the number of a strength that loads follow."""
+        found = self._operand(field, node)
+        if found not in self._strengths:
+            self._strengths.append(found)
+        return self._strengths.index(found)
+
+    def turn(self, name: str, first: Attachment, second: Attachment, strength: int) -> None:
+        """Let a torque of the plane follow a strength."""
+        self._torques._angle(name, first, second, _NO_LAW, Z)
+        self._turning.append(strength)
+
+    def signals(self, applied: Callable[[Callable[[int], int]], Applied]) -> Signals | tuple[()]:
+        """Return all as arrays; nothing where no load follows any. applied: makes the loads from their registers."""
+        if not self._strengths:
+            return ()
+        sizes = {
+            "measure": 2 * len(self.measures.kinds),
+            **{kind: len(rows) for kind, rows in self._rows.items()},
+            "function": len(self._functions),
+            "constant": len(self._constants),
+        }
+        base = dict(zip([*sizes, "result"], np.cumsum([0, *sizes.values()]).tolist(), strict=True))
+
+        def register(operand: Operand) -> int:
+            return int(base[operand[0]]) + operand[1]
+
+        strengths = [register(one) for one in self._strengths]
+        code = [[operation, *map(register, operands)] for operation, operands in self._code]
+        position, velocity = self._rows["position"], self._rows["velocity"]
+        turned = self._torques.forces()._replace(drive=index([strengths[k] for k in self._turning]))
+        return Signals(
+            self.measures.forces(),
+            index(position),
+            len(position),
+            index(velocity),
+            len(velocity),
+            index(self._functions),
+            len(self._functions),
+            stacked(self._constants),
+            len(self._constants),
+            index([one + [0] * (tape.ENTRIES - len(one)) for one in code]).ravel(),
+            len(code),
+            base["result"],
+            applied(lambda strength: strengths[strength]),
+            turned,
+        )
+
+    def _operand(self, field: str, node: Node) -> Operand:
+        if node not in self._known:
+            self._known[node] = self._entered(field, node)
+        return self._known[node]
+
+    def _entered(self, field: str, node: Node) -> Operand:
+        if isinstance(node, float | Constant):
+            value = self.scene.signals[node.name] if isinstance(node, Constant) else node
+            self._constants.append(value.number if isinstance(value, Function) else value)
+            return "constant", len(self._constants) - 1
+        if isinstance(node, Measure):
+            return self._measure(node)
+        if isinstance(node, Table) or is_of_time(node):
+            function = self.scene.signals[node.name] if isinstance(node, Table) else Formula(node)
+            self._functions.append(self._fit(field, function))
+            return "function", len(self._functions) - 1
+        operation, *parts = node
+        if operation == "+" and (factors := self._product(parts)):
+            self._code.append((tape.MULTIPLY_ADD, [self._operand(field, part) for part in factors]))
+        else:
+            self._code.append((tape.CODES[operation], [self._operand(field, part) for part in parts]))
+        return "result", len(self._code) - 1
+
+    def _product(self, parts: list[Node]) -> list[Node]:
+        """Return a, b and c of a sum a b + c whose product nothing else has asked for yet; else nothing."""
+        for part, other in (parts, parts[::-1]):
+            if isinstance(part, tuple) and part[0] == "*" and part not in self._known and not is_of_time(part):
+                return [part[1], part[2], other]
+        return []
+
+    def _measure(self, measure: Measure) -> Operand:
+        kind, names = measure.kind, measure.names
+        if kind in self._rows:
+            point = self.measures.placement.point(self.scene, place(self.scene, names[0]))
+            self._rows[kind].append(self.measures.rows.of(point)["xyz".index(names[1])])
+            return kind, len(self._rows[kind]) - 1
+        key = _RATES.get(kind, kind), names
+        if key not in self._measured:
+            self._measured[key] = len(self.measures.kinds)
+            self._add(str(measure), key[0], measure)
+        return "measure", 2 * self._measured[key] + (kind in _RATES)
+
+    def _add(self, name: str, kind: str, measure: Measure) -> None:
+        scene, measures = self.scene, self.measures
+        if kind == "distance":
+            ends = [measures.placement.point(scene, place(scene, one)) for one in measure.names]
+            measures._measure(name, DISTANCE, ends, _NO_LAW, 0.0)
+            return
+        joint = joint_of(scene, measure)
+        if kind == "slide":
+            line = joint.direction if isinstance(joint, Slider) and joint.axis is None else joint.axis
+            along = measures.placement.line(joint.first, line)
+            ends = [measures.placement.point(scene, side) for side in (joint.first, joint.second)]
+            measures._measure(name, PLACE, [*ends, along], _NO_LAW, 0.0)
+        elif joint is None:
+            base = Attachment(body=GROUND, point=(0.0,) * scene.dimensions)
+            measures._angle(name, base, Attachment(body=measure.names[0]), _NO_LAW, Z)
+        else:
+            measures._angle(name, joint.first, joint.second, _NO_LAW, joint.axis)

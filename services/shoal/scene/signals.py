@@ -1,0 +1,191 @@
+"""Signals: formulas of time, of measures of the machine and of each other, which loads follow.
+
+A signal is written out by putting the formulas of others in place of their names, so that what depends on t alone is
+a function of time like any other. Numbers stay what they are by name: lanes may differ in them.
+"""
+
+from __future__ import annotations
+
+import keyword
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from graphlib import CycleError, TopologicalSorter
+from typing import Any
+
+from shoal.scene import expression, formula
+from shoal.scene.ended import End
+from shoal.scene.formula import MEASURES, Measure, Node, leaves
+from shoal.scene.function import Function, SignalFunction
+from shoal.scene.joints import GROUND, Attachment, Cylindrical, DrivenAngle, Revolute, Slider
+
+TAKEN = {"t", "pi", "e", *expression.ONE, *expression.MANY, *MEASURES}
+_MOST, _DEEPEST = 2000, 200
+"""Operations of a signal that is written out, and how deep they are nested: bounds on time and memory."""
+_TURNING, _SLIDING = (Revolute, DrivenAngle, Cylindrical), (Slider, Cylindrical)
+_AXES = "xyz"
+
+
+@dataclass(frozen=True)
+class Constant:
+    """A signal that is a number, by its name."""
+
+    name: str
+
+
+@dataclass(frozen=True)
+class Table:
+    """A signal that is a table, by its name."""
+
+    name: str
+
+
+def check_signals(scene: Any) -> None:
+    """Raises ValueError for names that are taken or unknown, for measures that there are not, and for cycles."""
+    for name in scene.signals:
+        if name in TAKEN or keyword.iskeyword(name):
+            raise ValueError(f"signals.{name}: the name is taken by formulas; use another one")
+    for where, function in signal_functions(scene):
+        for leaf in _leaves(function):
+            if isinstance(leaf, Measure):
+                _check_measure(scene, where, leaf)
+            elif leaf != "t" and leaf not in scene.signals:
+                known = f"; there are the signals {', '.join(scene.signals)}" if scene.signals else ""
+                raise ValueError(f"{where}: {function.expression!r} has {leaf!r}, which is not known{known}; t is time")
+    if isinstance(scene.initial_from, End) and (fields := following(scene)):
+        raise ValueError(f"initial.from: {fields[0]} follows signals, which do not yet start at the end of a run")
+    size, depth = dict[str, int](), dict[str, int]()
+    for name in _order(scene.signals):
+        function = scene.signals[name]
+        size[name], depth[name] = _extent(_tree(function), size, depth)
+        if size[name] > _MOST or depth[name] > _DEEPEST:
+            raise ValueError(
+                f"signals.{name}: too long where signals are written out; at most {_MOST} operations, nested at most "
+                f"{_DEEPEST} deep"
+            )
+
+
+def signal_functions(scene: Any) -> Iterator[tuple[str, SignalFunction]]:
+    """Yield the signals of a scene and the functions of its loads that may depend on them, with their fields."""
+    for name, function in scene.signals.items():
+        if isinstance(function, SignalFunction):  # else an array, one number a lane
+            yield f"signals.{name}", function
+    for name, load in scene.loads.items():
+        for field, value in load:
+            if isinstance(value, SignalFunction):
+                yield f"loads.{name}.{field}", value
+
+
+def following(scene: Any) -> list[str]:
+    """Return the fields of loads that are no functions of time alone."""
+    found = (where for where, one in signal_functions(scene) if where.startswith("loads.") and not one.of_time)
+    return list(found)
+
+
+def written_out(scene: Any, function: SignalFunction) -> Node:
+    """Return the tree of a function with the formulas of signals in place of their names."""
+    known: dict[str, Node] = {}
+    for name in _order(scene.signals):
+        one = scene.signals[name]
+        if not isinstance(one, SignalFunction) or one.number is not None:
+            known[name] = Constant(name)
+        else:
+            known[name] = Table(name) if one.table is not None else _put(_tree(one), known)
+    return _put(_tree(function), known)
+
+
+def is_of_time(node: Node) -> bool:
+    """Return whether a tree that is written out depends on t alone, and can be written as one expression."""
+    return all(leaf == "t" for leaf in leaves(node))
+
+
+def place(scene: Any, name: str) -> Attachment:
+    """Return the place of a marker, of a moving point, of the ground, or where a body starts. Raises ValueError."""
+    found = [scene.markers[name]] if name in scene.markers else []
+    found += [Attachment(body=name)] if name in scene.bodies else []
+    found += [Attachment(body=GROUND, point=name)] if name in scene.ground_points else []
+    found += [Attachment(body=GROUND, point=(0.0,) * scene.dimensions)] if name == GROUND else []
+    if any(one != found[0] for one in found):
+        raise ValueError(f"{name!r} is the name of a marker and of another place; rename one of them")
+    if not found:
+        raise ValueError(f"no marker, body or point of the ground {name!r}; there are {', '.join(scene.markers)}")
+    return found[0]  # type: ignore[no-any-return]
+
+
+def joint_of(scene: Any, measure: Measure) -> Any:
+    """Return the joint whose motion is measured; None of the angle of a body. Raises ValueError."""
+    (name,) = measure.names
+    wanted = _TURNING if measure.kind in ("angle", "rate") else _SLIDING
+    joint = scene.joints.get(name)
+    if joint is None and wanted is _TURNING and name in scene.bodies:
+        return None
+    if joint is None:
+        bodies = " or body" if wanted is _TURNING else ""
+        known = ", ".join(one for one, each in scene.joints.items() if isinstance(each, wanted)) or "none"
+        raise ValueError(f"no joint{bodies} {name!r}; of this kind there are {known}")
+    if wanted is _TURNING and name in scene.bodies:
+        raise ValueError(f"{name!r} is the name of a joint and of a body; rename one of them")
+    if not isinstance(joint, wanted):
+        kinds = " or ".join(str(one.model_fields["kind"].default) for one in wanted)
+        raise ValueError(f"joint {name!r} is {joint.kind}; the measure is of {kinds}")
+    return joint
+
+
+def _check_measure(scene: Any, where: str, measure: Measure) -> None:
+    try:
+        if measure.kind in ("position", "velocity"):
+            name, axis = measure.names
+            at = place(scene, name)
+            if axis not in _AXES[: scene.dimensions]:
+                raise ValueError(f"the axis is {' or '.join(_AXES[: scene.dimensions])}, found {axis!r}")
+            scene._check_attachment(where, at)
+        elif measure.kind in ("distance", "distance_rate"):
+            first, second = (place(scene, name) for name in measure.names)
+            if first == second:
+                raise ValueError("both are one place")
+            for at in (first, second):
+                scene._check_attachment(where, at)
+        elif joint_of(scene, measure) is None:
+            (name,) = measure.names
+            if scene.dimensions == 3:
+                raise ValueError("in space an angle is that of a joint")
+            if scene.bodies[name].kind == "point-mass":
+                raise ValueError(f"{name} is a point mass, which has no direction")
+    except ValueError as error:
+        raise ValueError(f"{where}: {measure}: {str(error).removeprefix(where + '.point: ')}") from None
+
+
+def _leaves(function: SignalFunction) -> Iterator[Any]:
+    return leaves(formula.tree(function.expression)) if function.expression is not None else iter(())
+
+
+def _tree(function: SignalFunction) -> Node:
+    if function.expression is not None:
+        return formula.tree(function.expression)
+    return float(function.number) if function.number is not None else 0.0
+
+
+def _order(signals: Mapping[str, Function]) -> tuple[str, ...]:
+    """Return the names of signals, each behind those that it depends on. Raises ValueError for a cycle."""
+    graph = {
+        name: {leaf for leaf in _leaves(one) if leaf in signals} if isinstance(one, SignalFunction) else set()
+        for name, one in signals.items()
+    }
+    try:
+        return tuple(TopologicalSorter(graph).static_order())
+    except CycleError as error:
+        names = error.args[1][::-1]
+        raise ValueError(f"signals.{names[0]}: depends on itself: {' -> '.join(names)}") from None
+
+
+def _extent(node: Node, size: Mapping[str, int], depth: Mapping[str, int]) -> tuple[int, int]:
+    """Return the operations of a tree that is written out, and how deep they are nested."""
+    if not isinstance(node, tuple):
+        return (size.get(node, 0), depth.get(node, 0)) if isinstance(node, str) else (0, 0)
+    inner = [_extent(argument, size, depth) for argument in node[1:]]
+    return 1 + sum(one for one, _ in inner), 1 + max(one for _, one in inner)
+
+
+def _put(node: Node, known: Mapping[str, Node]) -> Node:
+    if isinstance(node, tuple):
+        return formula.make(node[0], *(_put(argument, known) for argument in node[1:]))
+    return known[node] if isinstance(node, str) and node != "t" else node

@@ -1,0 +1,321 @@
+"""Loads that follow signals: feedback, computed torques, wind and friction laws, against closed forms and scipy.
+
+The references were made with DOP853 of scipy at 3e-14 and Gauss's collocation of order 12, which agree to 1e-13.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from shoal.errors import InputError
+from shoal.mechanics.assembly.build import build
+from shoal.mechanics.simulate import simulate
+from shoal.scene import Scene
+
+FINE = {"relative_tolerance": 1e-12, "absolute_tolerance": 1e-12, "duration": 4.0}
+SIDE = 0.01
+
+
+def rod(length: float, mass: float) -> dict[str, Any]:
+    return {"kind": "rod", "length": length, "height": SIDE, "width": SIDE, "density": mass / (length * SIDE**2)}
+
+
+def ground(*point: float) -> dict[str, Any]:
+    return {"body": "ground", "point": list(point)}
+
+
+def pendulum(torque: str = "60*(ref - phi) - 6*rate(hinge)", **signals: Any) -> dict[str, Any]:
+    """A hanging rod with a motor in its hinge; phi from hanging down."""
+    return {
+        "name": "pd-pendulum",
+        "bodies": {"arm": rod(0.8, 2.0)},
+        "joints": {"hinge": {"first": ground(0, 0), "second": {"body": "arm"}}},
+        "loads": {"motor": {"kind": "torque", "at": {"body": "arm"}, "torque": torque}},
+        "signals": {"ref": 1.0, "phi": "angle(hinge) + pi/2", **signals},
+        "markers": {"tip": {"body": "arm", "point": "end"}},
+        "initial": {"arm": {"angle": 0.2 - math.pi / 2}},
+        "solver": {**FINE, "integrator": "dop853"},
+    }
+
+
+def cart_pole() -> dict[str, Any]:
+    return {
+        "name": "cart-pole-lqr",
+        "bodies": {"cart": {"kind": "point-mass", "mass": 1.0}, "pole": rod(0.6, 0.2)},
+        "joints": {
+            "rail": {"kind": "slider", "first": ground(0, 0), "second": {"body": "cart"}},
+            "pin": {"first": {"body": "cart"}, "second": {"body": "pole"}},
+        },
+        "signals": {"x": "slide(rail)", "phi": "pi/2 - angle(pole)", "v": "slide_rate(rail)", "w": "-rate(pole)"},
+        "loads": {
+            "drive": {
+                "kind": "force",
+                "at": {"body": "cart"},
+                "force": [1, 0],
+                "scale": "10*x + 57.644549*phi + 10.174577*v + 11.597209*w",
+            }
+        },
+        "markers": {"cart": {"body": "cart"}, "tip": {"body": "pole", "point": "end"}},
+        "initial": {"pole": {"angle": math.pi / 2 - 0.3}},
+        "solver": {**FINE, "integrator": "dop853"},
+    }
+
+
+def two_link() -> dict[str, Any]:
+    """Torques that make the error of each angle obey e'' + Kd e' + Kp e = 0, by the exact model of the arm."""
+    return {
+        "name": "two-link-computed-torque",
+        "bodies": {"upper": rod(0.5, 2.0), "fore": rod(0.4, 1.5)},
+        "joints": {
+            "shoulder": {"first": ground(0, 0), "second": {"body": "upper"}},
+            "elbow": {"first": {"body": "upper", "point": "end"}, "second": {"body": "fore"}},
+        },
+        "signals": {
+            "q1": "angle(shoulder)",
+            "q2": "angle(elbow)",
+            "v1": "rate(shoulder)",
+            "v2": "rate(elbow)",
+            "a1": "-1.2*sin(2*t) + 20*(0.6*cos(2*t) - v1) + 100*(0.3*sin(2*t) - q1)",
+            "a2": "3.6*cos(3*t) + 8*(1.2*sin(3*t) - v2) + 100*(0.5 - 0.4*cos(3*t) - q2)",
+            "k": "1.5*0.5*0.2",
+            "m12": "1.5*0.16/3 + k*cos(q2)",
+            "m11": "2*0.25/3 + 1.5*0.25 + 1.5*0.16/3 + 2*k*cos(q2)",
+            "far": "1.5*0.2*9.81*cos(q1 + q2)",
+            "u1": "m11*a1 + m12*a2 - k*sin(q2)*(2*v1*v2 + v2**2) + (2*0.25 + 1.5*0.5)*9.81*cos(q1) + far",
+            "u2": "m12*a1 + 1.5*0.16/3*a2 + k*sin(q2)*v1**2 + far",
+        },
+        "loads": {
+            "first": {"kind": "torque", "at": {"body": "upper"}, "torque": "u1"},
+            "second": {"kind": "torque", "at": {"body": "fore"}, "torque": "u2", "reaction": {"body": "upper"}},
+        },
+        "markers": {"elbow": {"body": "upper", "point": "end"}, "hand": {"body": "fore", "point": "end"}},
+        "initial": {"upper": {"angle": 0.2, "rate": 0.6}, "fore": {"angle": 0.2, "rate": 0.6}},
+        "solver": {**FINE, "integrator": "dop853"},
+    }
+
+
+def ball() -> dict[str, Any]:
+    """A ball in wind: its drag is along the motion against the air."""
+    drag = {"kind": "force", "at": {"body": "ball"}}
+    return {
+        "name": "thrown-ball-in-wind",
+        "bodies": {"ball": {"kind": "point-mass", "mass": 0.145}},
+        "joints": {},
+        "signals": {
+            "along": "velocity(ball, x) - 5*tanh(t/0.5)",
+            "up": "velocity(ball, y)",
+            "size": "-0.004*sqrt(along**2 + up**2)",
+        },
+        "loads": {
+            "x": {**drag, "force": [1, 0], "scale": "size*along"},
+            "y": {**drag, "force": [0, 1], "scale": "size*up"},
+        },
+        "markers": {"ball": {"body": "ball"}},
+        "initial": {"ball": {"position": [0, 1], "velocity": [30, 20]}},
+        "solver": {**FINE, "integrator": "dop853"},
+    }
+
+
+def stribeck() -> dict[str, Any]:
+    """A mass on a belt that sticks and slips by a smooth law."""
+    return {
+        "name": "stribeck-oscillator",
+        "bodies": {"mass": {"kind": "point-mass", "mass": 1.0}},
+        "joints": {"rail": {"kind": "slider", "first": ground(0, 0), "second": {"body": "mass"}}},
+        "signals": {
+            "slip": "0.2 - velocity(mass, x)",
+            "mu": "(0.3 + 0.3*exp(-(slip/0.1)**2))*tanh(slip/0.005)",
+        },
+        "loads": {
+            "belt": {"kind": "force", "at": {"body": "mass"}, "force": [10, 0], "scale": "mu"},
+            "wall": {
+                "kind": "force", "at": {"body": "mass"}, "force": [1, 0],
+                "scale": "-100*position(mass, x) - 0.5*velocity(mass, x)",
+            },
+        },
+        "markers": {"mass": {"body": "mass"}},
+        "initial": {"mass": {"position": [0.02, 0]}},
+        "solver": {**FINE, "integrator": "dop853"},
+    }  # fmt: skip
+
+
+def test_proportional_and_derivative_feedback() -> None:
+    found = simulate(Scene.parse(pendulum()), np.array([0.05, 0.2, 0.5, 1.0, 2.0]))
+    angle = [0.3056879204592912, 0.8738106876494041, 0.9033422410592403, 0.8984726148687577, 0.8977255510239434]
+    assert found.angles[:, 0, 0] + math.pi / 2 == pytest.approx(angle, abs=1e-10)
+    assert found.ok
+    assert found.energy_drift[0] < 1e-8
+
+
+def test_a_regulator_holds_a_pole_upright() -> None:
+    found = simulate(Scene.parse(cart_pole()), np.array([0.1, 0.5, 1.0, 2.0, 4.0]))
+    x = [0.054421503591930626, 0.3311245978481899, 0.2553229658667395, 0.022357501561871062, -0.00048060257833727814]
+    phi = [0.203453150425277, -0.13251302386155114, -0.03207946693879945, 0.021851891840485433, -0.0003074070613766779]
+    assert found.points[:, 0, 0, 0] == pytest.approx(x, abs=1e-9)
+    assert math.pi / 2 - found.angles[:, 1, 0] == pytest.approx(phi, abs=1e-9)
+
+
+def test_computed_torques_leave_the_errors_that_they_promise() -> None:
+    """A sign, or a relative angle that is taken for an absolute one, breaks the closed form."""
+    t = np.array([0.05, 0.2, 0.5, 1.0])
+    found = simulate(Scene.parse(two_link()), t)
+    w = math.sqrt(84.0)
+    first = 0.3 * np.sin(2 * t) + 0.2 * (1 + 10 * t) * np.exp(-10 * t)
+    second = 0.5 - 0.4 * np.cos(3 * t) - 0.1 * np.exp(-4 * t) * (np.cos(w * t) + 4 / w * np.sin(w * t))
+    assert found.angles[:, 0, 0] == pytest.approx(first, abs=1e-10)
+    assert found.angles[:, 1, 0] - found.angles[:, 0, 0] == pytest.approx(second, abs=1e-10)
+
+
+def test_drag_against_wind() -> None:
+    found = simulate(Scene.parse(ball()), np.array([0.5, 1.0, 2.0, 4.0]))
+    x = [12.441461318754053, 22.177665001725835, 38.209733318697495, 61.66035906778614]
+    y = [8.119339932872448, 11.26460937820482, 9.623920302995554, -14.426549520960473]
+    assert found.points[:, 0, 0, 0] == pytest.approx(x, abs=1e-9)
+    assert found.points[:, 0, 1, 0] == pytest.approx(y, abs=1e-9)
+
+
+def test_friction_by_a_law_of_its_own() -> None:
+    found = simulate(Scene.parse(stribeck()), np.array([0.2, 0.5, 1.0, 2.0]))
+    x = [0.04483970252600786, 0.04461792965559237, 0.04730800166176655, 0.06782904008090142]
+    assert found.points[:, 0, 0, 0] == pytest.approx(x, abs=1e-8)
+    assert found.energy_drift[0] < 1e-6
+
+
+@pytest.mark.parametrize("integrator", ["rk4", "leapfrog", "dop853"])
+def test_lanes_are_single_runs(integrator: str) -> None:
+    """Gains that lanes differ in are registers of the tape, in single runs as well; tiles round a mass otherwise."""
+    solver = {**FINE, "integrator": integrator, "step": 1e-3, "duration": 0.1}
+    scene = Scene.parse({**pendulum("kp*(ref - phi)*tanh(t + phi) - 6*rate(hinge)", kp=60.0), "solver": solver})
+    times, gains = np.array([0.05, 0.1]), np.linspace(40.0, 60.0, 16)
+    side_by_side = simulate(scene, times, {"signals.kp": gains})
+    for lane in (0, 7, 15):
+        alone = simulate(scene.with_values({"signals.kp": gains[lane]}), times)
+        assert side_by_side.points[..., lane] == pytest.approx(alone.points[..., 0], abs=1e-11)
+
+
+@pytest.mark.parametrize(("integrator", "order"), [("rk4", 4), ("leapfrog", 2)])
+def test_fixed_steps_keep_their_order(integrator: str, order: int) -> None:
+    times, exact = np.array([0.5]), 0.9033422410592403 - math.pi / 2
+    solver = {"integrator": integrator, "duration": 0.5}
+    errors = []
+    for step in (2e-3, 1e-3):
+        found = simulate(Scene.parse({**pendulum(), "solver": {**solver, "step": step}}), times)
+        errors.append(abs(float(found.angles[0, 0, 0]) - exact))
+    assert math.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.3)
+
+
+def test_a_spring_that_is_stated_as_a_signal_is_that_spring() -> None:
+    """Whole turns of an angle are counted, and distances are those of markers."""
+    stated, turned = pendulum("3*(20 - angle(hinge))"), pendulum("0*t")
+    spring = {"kind": "torsion-spring", "first": ground(0, 0), "second": {"body": "arm"}, "stiffness": 3, "angle": 20}
+    turned["loads"] = {"motor": spring}
+    times = np.linspace(0.0, 4.0, 9)
+    one, other = (simulate(Scene.parse(each), times) for each in (stated, turned))
+    assert np.max(one.angles) > 2 * math.pi
+    assert one.points == pytest.approx(other.points, abs=1e-8)
+
+
+def test_directions_in_space() -> None:
+    """A hinge about any axis, a torque about it, a following force and a slider: as springs and dampers say it."""
+    axis, tip = [1.0, 2.0, -0.5], {"body": "arm", "point": "end"}
+    base = {
+        "name": "space",
+        "dimensions": 3,
+        "gravity": [0, 0, -9.81],
+        "bodies": {"arm": rod(0.8, 2.0), "bead": {"kind": "point-mass", "mass": 0.3}},
+        "joints": {
+            "hinge": {"first": ground(0, 0, 0), "second": {"body": "arm"}, "axis": axis},
+            "rail": {"kind": "slider", "first": {"body": "arm"}, "second": {"body": "bead"}, "axis": [1, 0, 0]},
+        },
+        "markers": {"tip": tip, "bead": {"body": "bead"}},
+        "initial": {"arm": {"rotation": [0.1, 0.0, 0.0]}, "bead": {"position": [0.3, 0.0, 0.0]}},
+        "solver": {**FINE, "duration": 1.0, "integrator": "dop853"},
+    }
+    post = {"kind": "spring", "second": {"body": "bead"}, "first": tip, "length": 0.2, "stiffness": 50, "damping": 2}
+    springs = {
+        "turn": {
+            "kind": "torsion-spring", "first": ground(0, 0, 0), "second": {"body": "arm"}, "axis": axis,
+            "stiffness": 8, "damping": 0.5, "angle": 0.3,
+        },
+        "post": post,
+    }  # fmt: skip
+    torque = "8*(0.3 - angle(hinge)) - 0.5*rate(hinge)"
+    turn = {"kind": "torque", "at": {"body": "arm"}, "axis": axis, "torque": torque}
+    signals = {"turn": turn, "post": post}
+    times = np.linspace(0.0, 1.0, 5)
+    one, other = (simulate(Scene.parse({**base, "loads": each}), times) for each in (springs, signals))
+    assert one.points == pytest.approx(other.points, abs=1e-9)
+
+
+def test_what_depends_on_time_alone_is_a_function_of_time() -> None:
+    """Its jumps are ends of steps, and nothing of it is evaluated by the tape."""
+    scene = Scene.parse(pendulum("2*late + 1", late="step(t - 0.3)"))
+    model = build(scene, horizon=1.0)
+    assert not model.signals
+    assert 0.3 in model.kinks[0]
+    of_both: Any = build(Scene.parse(pendulum("late*phi", late="step(t - 0.3)*sin(t)")), horizon=1.0)
+    assert of_both.signals.size == 2  # of angle + pi/2, times the function
+    assert 0.3 in of_both.kinks[0]
+
+
+def test_equal_parts_are_evaluated_once() -> None:
+    scene = Scene.parse(pendulum("a + b + a", a="sin(phi)*rate(hinge)", b="sin(phi)*3"))
+    found: Any = build(scene).signals
+    assert found.size <= 7
+
+
+@pytest.mark.parametrize(
+    ("changes", "why"),
+    [
+        ({"signals": {"a": "2*b", "b": "a + 1"}}, "signals.a: depends on itself: a -> b -> a"),
+        ({"signals": {"a": "a"}}, "signals.a: depends on itself: a -> a"),
+        ({"signals": {"sin": 1.0}}, "signals.sin: the name is taken by formulas"),
+        ({"signals": {"angle": 1.0}}, "signals.angle: the name is taken"),
+        ({"signals": {"t": 1.0}}, "signals.t: the name is taken"),
+        ({"signals": {"a-b": 1.0}}, "signals.a-b"),
+        ({"torque": "kp*t"}, "loads.motor.torque: 'kp*t' has 'kp', which is not known"),
+        ({"torque": "angle(knee)"}, "loads.motor.torque: angle(knee): no joint or body 'knee'"),
+        ({"torque": "slide(hinge)"}, "loads.motor.torque: slide(hinge): joint 'hinge' is revolute"),
+        ({"torque": "angle(hinge, x)"}, "angle takes the name of a part"),
+        ({"torque": "angle(2*hinge)"}, "angle takes the name of a part"),
+        ({"torque": "angle(" + "-" * 300 + "x)"}, "angle takes the name of a part"),
+        ({"torque": "position(tip, z)"}, "the axis is x or y, found 'z'"),
+        ({"torque": "distance(tip, tip)"}, "both are one place"),
+        ({"torque": "velocity(top, x)"}, "no marker, body or point of the ground 'top'; there are tip"),
+        ({"bodies": {"hinge": rod(0.1, 1.0)}}, "'hinge' is the name of a joint and of a body"),
+        ({"markers": {"arm": {"body": "arm", "point": "end"}}, "torque": "position(arm, x)"}, "of another place"),
+        ({"signals": {f"s{k}": f"s{k + 1}*s{k + 1}" for k in range(20)} | {"s20": "t"}}, "too long where signals"),
+        ({"signals": {f"s{k}": f"s{k + 1} + 1" for k in range(300)} | {"s300": "t"}}, "too long where signals"),
+        ({"joints": {"drive": {"kind": "driven-angle", "angle": "phi"}}}, "'phi', which is not known; the time is `t`"),
+    ],
+)
+def test_refused_in_one_line(changes: dict[str, Any], why: str) -> None:
+    data = pendulum(changes.get("torque", "phi"))
+    for part in ("signals", "markers", "bodies"):
+        data[part] |= changes.get(part, {})
+    for name, joint in changes.get("joints", {}).items():
+        data["joints"][name] = {"first": {"body": "ground"}, "second": {"body": "arm"}, **joint}
+    with pytest.raises(InputError) as caught:
+        Scene.parse(data)
+    assert why in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_names_of_parts_may_hold_hyphens() -> None:
+    data = pendulum('angle("left-hinge") - rate(left-hinge)')
+    data["joints"] = {"left-hinge": data["joints"]["hinge"]}
+    data["signals"] = {}
+    assert Scene.parse(data).value("loads.motor.torque").expression == 'angle("left-hinge") - rate(left-hinge)'
+
+
+def test_what_knows_no_signals_says_so() -> None:
+    from shoal.mechanics.analysis.statics import statics
+
+    scene = Scene.parse(pendulum())
+    with pytest.raises(InputError, match=r"loads.motor.torque: follows signals"):
+        statics(scene)
+    with pytest.raises(InputError, match=r"solver.integrator: radau5 knows no signals, as of loads.motor.torque"):
+        simulate(scene.with_values({"solver.integrator": "radau5"}), np.array([0.1]))
