@@ -98,7 +98,7 @@ def _bent(curvature: float, shear: float) -> tuple[Scene, States]:
         along, across = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
         q[1, list(node[1].own), 0] = along + shear * across
         q[1, list(node[2].own), 0] = along
-    return scene, States(model, q, np.zeros_like(q))
+    return scene, States.room(model, 2)._replace(q=q, v=np.zeros_like(q))
 
 
 @pytest.mark.parametrize(

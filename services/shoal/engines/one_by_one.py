@@ -81,8 +81,8 @@ def _side_by_side(runs: Sequence[Trajectory], wall_s: float) -> Trajectory:
     states = [run.states for run in runs]
     first = next((one for one in states if one is not None), None)
     if first is not None:
-        coordinates, rates = (known([getattr(one, name, None) for one in states]) for name in "qv")
-        first = first._replace(q=coordinates, v=rates)
+        fields = ("q", "v", "contacts")
+        first = first._replace(**{field: known([getattr(one, field, None) for one in states]) for field in fields})
     return replace(
         runs[0],
         points=together([run.points for run in runs]),

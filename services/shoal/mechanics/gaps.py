@@ -71,17 +71,17 @@ class GapWork(NamedTuple):
     sticks by dry friction [rad or m]; its value is the way from there. speed: at which one that gives way was met
     [m/s]. before: value, rate, force and margin at the beginning of a step, (4 * contacts, lanes). closed: whether the
     contact is closed, unclear: whether its force was not unique at any time, in a way that moves the machine, mode:
-    whether it sticks or slips; hit: what event of it a step has ended at. force: multiplier by direction, of a closed
-    contact along the normal not negative [N or N m]; near: those of the last decision. slip, bias: rate of each
-    direction, and its derivative for accelerations of zero. heading: direction of slip in the axes of the ground, (3 *
-    contacts, lanes); axes: normal and tangents, (9 * contacts, lanes). gradient, response: of each direction, and the
-    acceleration by a unit force, (directions * unknowns, lanes). none: the acceleration without forces, unit: a unit
-    force, (rows, lanes). reaction: multipliers of the constraints: without forces, by a unit force of each direction,
-    and as they are, ((directions + 2) * constraints, lanes). matrix, load, found, way, chosen: of one lane. pair:
-    `pairs.describe`. order: of the last impact, how far the impulses of contacts that strike one after the other would
-    be from those at once, (lanes,). log: time, contact, kind, impulse and `order` of each event of the first lane,
-    (RECORD * LOGGED,); number: of events, decisions: times at which contacts were decided on, alone: whether a lane of
-    a tile of several comes near an event, which it has to meet alone, (lanes,).
+    whether it sticks or slips; hit: what event of it a step has ended at; impulse: at the last event. force: multiplier
+    by direction, of a closed contact along the normal not negative [N or N m]; near: those of the last decision. slip,
+    bias: rate of each direction, and its derivative for accelerations of zero. heading: direction of slip in the axes
+    of the ground, (3 * contacts, lanes); axes: normal and tangents, (9 * contacts, lanes). gradient, response: of each
+    direction, and the acceleration by a unit force, (directions * unknowns, lanes). none: the acceleration without
+    forces, unit: a unit force, (rows, lanes). reaction: multipliers of the constraints: without forces, by a unit force
+    of each direction, and as they are, ((directions + 2) * constraints, lanes). matrix, load, found, way, chosen: of
+    one lane. pair: `pairs.describe`. order: of the last impact, how far the impulses of contacts that strike one after
+    the other would be from those at once, (lanes,). log: time, contact, kind, impulse and `order` of each event of the
+    first lane, (RECORD * LOGGED,); number: of events, decisions: times at which contacts were decided on, alone:
+    whether a lane of a tile of several comes near an event, which it has to meet alone, (lanes,).
     """
 
     memory: Array
@@ -95,6 +95,7 @@ class GapWork(NamedTuple):
     unclear: Array
     mode: Array
     hit: Array
+    impulse: Array
     force: Array
     near: Array
     slip: Array
@@ -121,6 +122,8 @@ class GapWork(NamedTuple):
 
 LOGGED, RECORD = 4096, 5
 """So many events of the first lane are kept, of so many numbers each."""
+KEPT = 9
+"""Numbers of the state of a contact: closed, mode, speed, three of heading, and of near by normal and tangents."""
 
 
 def room(width: int, g: Gaps, unknowns: int, rows: int, constraints: int) -> GapWork:
@@ -140,6 +143,13 @@ def room(width: int, g: Gaps, unknowns: int, rows: int, constraints: int) -> Gap
     return GapWork._make([np.zeros(sizes.get(name, each)) for name in GapWork._fields])
 
 
+def enter(gaps: Gaps, g: GapWork, kept: Array) -> None:
+    """Put the state of the contacts of a single lane, (contacts, KEPT), back into its work space, see `keep`."""
+    g.closed[:], g.mode[:], g.speed[:] = kept[:, :3].T
+    g.heading[:] = kept[:, 3:6].ravel()
+    g.near[:] = kept[:, 6 : 7 + gaps.tangents].ravel()
+
+
 def shifted(gaps: Gaps, shifts: Mapping[int, float]) -> Gaps:
     """Return the contacts with less of a gap [m or rad], by the contact's number."""
     law, radius = gaps.measures.law.copy(), gaps.pairs.radius.copy()
@@ -150,6 +160,27 @@ def shifted(gaps: Gaps, shifts: Mapping[int, float]) -> Gaps:
         else:
             law[LAW * number + NATURAL] += shift / gaps.weight[number]
     return gaps._replace(measures=gaps.measures._replace(law=law), pairs=gaps.pairs._replace(radius=radius))
+
+
+@njit(cache=True, error_model="numpy")
+def keep(tile: Tile, gaps: Gaps, g: GapWork, at_event: bool, out: Array, first: int) -> None:
+    """Write what contacts do between two events from out[first] on, (contacts, KEPT, lanes); nan at an impact.
+
+    at_event: whether this is the instant of the last event
+    """
+    width, ways = len(tile), 1 + gaps.tangents
+    for lane in range(width):
+        strikes = False
+        for contact in range(gaps.size):
+            strikes = strikes or (at_event and g.impulse[contact * width + lane] != 0.0)
+        for contact in range(gaps.size):
+            at, row = contact * width + lane, first + contact * KEPT * width + lane
+            out[row], out[row + width], out[row + 2 * width] = g.closed[at], g.mode[at], g.speed[at]
+            for k in range(3):
+                out[row + (3 + k) * width] = g.heading[(3 * contact + k) * width + lane]
+                out[row + (6 + k) * width] = g.near[(contact * ways + k) * width + lane] if k < ways else 0.0
+            if strikes:
+                out[row] = np.nan
 
 
 @njit(cache=True, error_model="numpy")

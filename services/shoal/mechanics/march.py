@@ -22,7 +22,7 @@ from numba import carray, njit, typeof, types
 from shoal.compile import function_pointers, simd, structures
 from shoal.compile.pointers import pointer, raw_type
 from shoal.compile.structures import Reference
-from shoal.mechanics import constraints, kernels
+from shoal.mechanics import constraints, gaps, kernels
 from shoal.mechanics import contact_events as events
 from shoal.mechanics.derived import derive
 from shoal.mechanics.dynamics import Work, loaded, remember
@@ -176,13 +176,16 @@ def loop(frame):  # type: ignore[no-untyped-def]
         slack = 1e-9 * (taken if free else step)
         while sample < len(times) and times[sample] <= now + slack:
             _sample(tile, scheme, m, w, k, marker_rows, times[sample] - now, taken, slack, record.samples, sample)
+            _keep_contacts(tile, m, w, record, sample, False)
             sample += 1
-        own[DONE] = 1.0 if number == steps or now >= ending else own[DONE]
-        if own[DONE] > 0.0 or number + cuts >= room:
-            break
         if own[EVENT] > 0.0:
             own[EVENT] = 0.0
             _leave_event(tile, scheme, m, w, k, now, tolerance, record.energy_scale)
+            if sample > 0 and abs(times[sample - 1] - now) <= slack:
+                _keep_contacts(tile, m, w, record, sample - 1, True)
+        own[DONE] = 1.0 if number == steps or now >= ending else own[DONE]
+        if own[DONE] > 0.0 or number + cuts >= room:
+            break
         if halt <= last and now == halts.times[halt]:
             halt += 1
             w.until[0] = np.nextafter(halts.times[halt], 0.0) if halt <= last else np.inf
@@ -290,6 +293,13 @@ def _sample(
                 turns += np.arctan2(w.z[y_row], w.z[x_row]) - np.arctan2(y, x)
             samples[first + 2 * d * width + lane] = turns
             samples[first + (3 * d + 1) * width + lane] = (x * k.v[y_row] - y * k.v[x_row]) / (x * x + y * y)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _keep_contacts(tile: Tile, m: Arrays, w: Work, record: Marched, sample: int, at_event: bool) -> None:
+    """Keep what the contacts do at a sample, or from it on where it is at an event."""
+    if m.gaps.size > 0:
+        gaps.keep(tile, m.gaps, w.gaps, at_event, record.contacts, sample * m.gaps.size * gaps.KEPT * len(tile))
 
 
 @njit(cache=True, error_model="numpy")

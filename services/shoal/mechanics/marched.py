@@ -11,6 +11,7 @@ from shoal.compile.pointers import raw_type
 from shoal.compile.structures import Reference
 from shoal.mechanics import constraints
 from shoal.mechanics.dynamics import Work
+from shoal.mechanics.gaps import KEPT
 from shoal.mechanics.halts import Halts
 from shoal.mechanics.integrators.scheme import Scheme
 from shoal.mechanics.model import Arrays, seen
@@ -29,17 +30,18 @@ PROGRESS = 12
 class Marched(NamedTuple):
     """Record of the time loop. samples: (times * markers * sampled(d), lanes), see `sampled`; the rest: (lanes,).
 
-    energy_error: largest |E + dissipated - E(0)| [J]; energy_scale: largest energy in motion [J], kinetic, of
-    bent bodies and the size of that of springs; drift: largest violation of a constraint by its power of a length,
-    (POWERS * lanes,); begin: coordinates and rates at the start, made consistent, (2 * unknowns, lanes);
-    ended, closeness, singular: as in `GaussWork` (near), (3 * lanes,) and (lanes,).
-    Common to the lanes of a tile: steps taken, evaluations of the forces, the time reached [s].
+    energy_error: largest |E + dissipated - E(0)| [J]; energy_scale: largest energy in motion [J], kinetic, of bent
+    bodies and the size of that of springs; drift: largest violation of a constraint by its power of a length, (POWERS *
+    lanes,); contacts: see `gaps.keep`, (times * contacts * KEPT, lanes); begin: coordinates and rates at the start,
+    made consistent, (2 * unknowns, lanes); ended, closeness, singular: as in `GaussWork` (near), (3 * lanes,) and
+    (lanes,). Common to the lanes of a tile: steps taken, evaluations of the forces, the time reached [s].
     """
 
     samples: Array
     energy_error: Array
     energy_scale: Array
     drift: Array
+    contacts: Array
     begin: Array
     ended: Array
     closeness: Array
@@ -94,6 +96,7 @@ def rooms(tile: Tile, arrays: Arrays, times: int, marker_rows: Index) -> tuple[M
         np.zeros(width),
         np.zeros(width),
         np.zeros(constraints.POWERS * width),
+        np.full(times * arrays.gaps.size * KEPT * width, np.nan),
         np.zeros(2 * end),
         np.zeros(3 * width),
         np.zeros(width),

@@ -137,7 +137,8 @@ class Runs:
             for lane in alone:  # its events would cut the steps of all
                 march(slice(part.start + int(lane), part.start + int(lane) + 1))
 
-        if end == 0.0 and seek is None and self._alike and not self.model.constraints.size:
+        free = not (self.model.constraints.size or self.model.gaps.size)
+        if end == 0.0 and seek is None and self._alike and free:
             self._still.fill(moved, turns, limits.anchors, motion, numbers)
             states = None if states is None else states._replace(q=moved.q0[None].copy(), v=moved.v0[None].copy())
             if single not in self._found:

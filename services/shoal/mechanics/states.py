@@ -6,22 +6,28 @@ from typing import NamedTuple
 
 import numpy as np
 
+from shoal.mechanics.gaps import KEPT
 from shoal.mechanics.marched import Marched, sampled
 from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import Array, Index
 
 
 class States(NamedTuple):
-    """States of the lanes of a model at sampled times: coordinates and rates, (samples, unknowns, lanes) each."""
+    """States of the lanes of a model at sampled times: coordinates and rates, (samples, unknowns, lanes) each.
+
+    contacts: what they do from that time on, see `gaps.keep`, (samples, contacts, KEPT, lanes)
+    """
 
     model: Model
     q: Array
     v: Array
+    contacts: Array
 
     @classmethod
     def room(cls, model: Model, samples: int) -> States:
         """Not filled yet."""
-        return cls(model, *(np.full((samples, model.unknowns, model.lanes), np.nan) for _ in range(2)))
+        shapes = (model.unknowns,), (model.unknowns,), (model.gaps.size, KEPT)
+        return cls(model, *(np.full((samples, *shape, model.lanes), np.nan) for shape in shapes))
 
 
 def rows(model: Model) -> Index:
@@ -40,6 +46,7 @@ def split(record: Marched, states: States, width: int, part: slice) -> Marched:
     for found, first in ((states.q, 0), (states.v, 2 * d + 1)):
         numbers = samples[:, markers:, first : first + d, :lanes]
         found[..., part] = numbers.reshape(len(found), -1, lanes)[:, : model.unknowns]
+    states.contacts[..., part] = record.contacts.reshape(*states.contacts.shape[:3], width)[..., :lanes]
     return record._replace(samples=samples[:, :markers].ravel())
 
 

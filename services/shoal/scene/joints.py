@@ -163,8 +163,11 @@ class Resisted(Tie):
         return any(np.any(size) for size in (self.friction, self.drag, self.coulomb, self.share))
 
     def resistance(self, rate: Array, force: Array | float = 0.0) -> Array:
-        """Torque [N m] or force [N] against a rate, where the force of the joint [N] is so large."""
-        dry = self.coulomb + self.share * force
+        """Torque [N m] or force [N] against a rate, where the force of the joint [N] is so large.
+
+        Without dry friction that sticks exactly, which is a contact's.
+        """
+        dry = (0.0 if self.stick == "exact" else self.coulomb) + self.share * force
         smoothed = dry * np.tanh(rate / self.coulomb_speed)
         return np.asarray((self.friction + self.drag * np.abs(rate)) * rate + smoothed)
 
@@ -518,3 +521,11 @@ def turned(joint: Joint) -> dict[str, Attachment]:
     if isinstance(joint, Weld) and joint.angle is None:
         return {}
     return {side: getattr(joint, side) for side in joint.turned}
+
+
+def is_one_sided(joint: Any) -> bool:
+    """Return whether a joint has stops, play or backlash, is a rope or a strut, or has dry friction that sticks."""
+    if isinstance(joint, Distance):
+        return joint.keeps != "exactly"
+    limits = any(getattr(joint, field, None) is not None for field in ("stops", "play", "backlash"))
+    return limits or getattr(joint, "stick", "smooth") == "exact"

@@ -254,6 +254,11 @@ class Scene(Record):
         return self.initial_from == "statics"
 
     @property
+    def touches(self) -> bool:
+        """Return whether it has contacts, stops, ropes, struts or friction that sticks."""
+        return bool(self.contacts) or any(joint_types.is_one_sided(joint) for joint in self.joints.values())
+
+    @property
     def flexible_rods(self) -> dict[str, Rod]:
         """The rods that bend, by their names."""
         return {n: body for n, body in self.bodies.items() if isinstance(body, Rod) and body.element != "rigid"}

@@ -29,6 +29,8 @@ Quantity = Literal[
     "my",
     "mz",
     "torque",
+    "normal",
+    "friction",
     "strain",
 ]
 ACCELERATIONS: tuple[Quantity, ...] = ("ax", "ay", "az")
@@ -37,15 +39,17 @@ RATES: tuple[Quantity, ...] = ("wx", "wy", "wz")
 FORCES: tuple[Quantity, ...] = ("fx", "fy", "fz")
 MOMENTS: tuple[Quantity, ...] = ("mx", "my", "mz")
 STRAIN: Quantity = "strain"
-REACTIONS: tuple[Quantity, ...] = (*FORCES, *MOMENTS, "torque")
-"""What a load cell in a joint and a strain gauge show."""
+PRESSING: tuple[Quantity, ...] = ("normal", "friction")
+"""What a load cell below a contact shows along its normal and across it."""
+REACTIONS: tuple[Quantity, ...] = (*FORCES, *MOMENTS, "torque", *PRESSING)
+"""What a load cell in a joint or below a contact shows."""
 IN_SPACE = ("z", "az", *RATES, "fz", *MOMENTS)
 """What is measured in space only."""
 _UNITS: dict[str, Any] = {
     **dict.fromkeys(("x", "y", "z"), LengthUnit),
     **dict.fromkeys(("angle", "rate", *RATES), AngleUnit),
     **dict.fromkeys(ACCELERATIONS, AccelerationUnit),
-    **dict.fromkeys(FORCES, ForceUnit),
+    **dict.fromkeys((*FORCES, *PRESSING), ForceUnit),
     **dict.fromkeys((*MOMENTS, "torque"), TorqueUnit),
     STRAIN: StrainUnit,
 }
@@ -63,6 +67,8 @@ class Channel(Record):
     [rad], as an accelerometer shows it; wx, wy, wz [rad/s]: angular velocity in space along these axes, for which the
     tilt may be a rotation vector. fx, fy [N], torque [N m]: what a `joint` exerts on its second body, along the axes of
     the ground, friction and drive included; in space fx, fy, fz, mx, my, mz, and of a drive the torque about its axis.
+    fx, fy, in space fz, normal, friction [N]: what a `contact` exerts on its first body; friction is in the plane along
+    the normal turned clockwise, in space a size.
     strain: of a flexible rod along its axis, at a marker and a `height` above the axis, in space a `side` of it
     towards the local z axis too [m].
 
@@ -78,6 +84,7 @@ class Channel(Record):
 
     marker: str = ""
     joint: str | None = None
+    contact: str | None = None
     quantity: Quantity
     to: str | None = None
     tilt: Angle | tuple[Angle, Angle, Angle] = 0.0
@@ -99,10 +106,15 @@ class Channel(Record):
 
     @model_validator(mode="after")
     def _somewhere(self) -> Self:
-        if self.quantity in REACTIONS and (self.joint is None or self.marker):
-            raise ValueError(f"joint: {self.quantity} is measured in a joint; name it, and no marker")
-        if self.quantity not in REACTIONS and (self.joint is not None or not self.marker):
-            raise ValueError(f"marker: {self.quantity} is measured at a marker; name it, and no joint")
+        named = [field for field in ("marker", "joint", "contact") if getattr(self, field)]
+        places = ["in a joint"] if self.quantity in REACTIONS and self.quantity not in PRESSING else []
+        places += ["at a contact"] if self.quantity in (*FORCES, *PRESSING) else []
+        places = places or ["at a marker"]
+        kinds = [one.rsplit(maxsplit=1)[-1] for one in places]
+        if len(named) != 1 or named[0] not in kinds:
+            other = "joint" if kinds == ["marker"] else "marker"
+            where = " or ".join(places)
+            raise ValueError(f"{kinds[0]}: {self.quantity} is measured {where}; name it, and no {other}")
         if self.tilt and self.quantity not in (*ACCELERATIONS, *RATES):
             raise ValueError(f"tilt: of the axes of ax and ay, found {self.quantity}")
         for field in ("height", "side"):
@@ -134,8 +146,8 @@ class Channel(Record):
 
     @property
     def place(self) -> str:
-        """The marker or the joint."""
-        return self.joint or self.marker
+        """The marker, the joint or the contact."""
+        return self.joint or self.contact or self.marker
 
     @property
     def signal(self) -> str:

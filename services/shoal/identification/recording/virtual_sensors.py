@@ -13,7 +13,16 @@ import numpy as np
 from shoal.engines.contract import Engine
 from shoal.engines.gauss import GaussEngine
 from shoal.errors import InputError
-from shoal.identification.recording.source import ACCELERATIONS, IN_SPACE, MOMENTS, RATES, STRAIN, Channel
+from shoal.identification.recording.source import (
+    ACCELERATIONS,
+    IN_SPACE,
+    MOMENTS,
+    PRESSING,
+    RATES,
+    REACTIONS,
+    STRAIN,
+    Channel,
+)
 from shoal.scene import FRAMED, Attachment, Rod, Scene
 from shoal.scene.joints import DrivenAngle
 from shoal.trajectory import Array, Trajectory
@@ -35,13 +44,13 @@ def from_start(times: Array, channels: tuple[Channel, ...]) -> Array:
 
 
 def needs_states(scene: Scene, channels: tuple[Channel, ...]) -> bool:
-    """Return whether sensors of some channels need more than the motion of bodies: the machine bends or is in
+    """Return whether sensors of some channels need more than the motion of bodies: the machine bends, touches or is in
     space.
     """
     if scene.dimensions == 3:
         return any(channel.is_sensor for channel in channels)
     bends = any(body.element != "rigid" for body in scene.bodies.values())
-    return bends and any(channel.is_dynamic for channel in channels)
+    return (bends or scene.touches) and any(channel.is_dynamic for channel in channels)
 
 
 def engine_options(engine: Engine, scene: Scene, channels: tuple[Channel, ...]) -> dict[str, bool]:
@@ -50,7 +59,7 @@ def engine_options(engine: Engine, scene: Scene, channels: tuple[Channel, ...]) 
         return {}
     if not isinstance(engine, GaussEngine):
         quantity = next(channel.quantity for channel in channels if channel.is_sensor)
-        where = "in space" if scene.dimensions == 3 else "of a machine that bends"
+        where = "in space" if scene.dimensions == 3 else "of a machine that bends or touches"
         raise InputError(f"channels: {quantity} {where} is computed by the engine gauss alone; found {engine.name}")
     return {"whole": True}
 
@@ -105,7 +114,7 @@ def sensor_channels(
     shape = len(trajectory.times), max(trajectory.lanes, len(turned))
     turned = np.broadcast_to(turned, shape[1])
     found |= {k: np.full(shape, np.nan) for k in dynamic}
-    joints = tuple(dict.fromkeys(c.joint for k in dynamic if (c := channels[k]).joint is not None))
+    joints = tuple(dict.fromkeys(_exerting(channels[k]) for k in dynamic if channels[k].quantity in REACTIONS))
     lanes = _by_states if needs_states(scene, channels) else _by_course
     alone = bool(joints) or scene.alone(values) is not None
     for lane, one in lanes(trajectory, scene, values, channels[dynamic[0]], alone):
@@ -161,8 +170,10 @@ def _of_lane(
     c, s, found = np.cos(turned), np.sin(turned), {}
     for k in numbers:
         channel, axis = channels[k], "xyz".find(channels[k].quantity[1:])
-        if channel.joint is not None:
-            force, torque, drive = reactions[channel.joint]
+        if channel.quantity in PRESSING:
+            found[k] = getattr(reactions[_exerting(channel)], channel.quantity)[:, None]
+        elif channel.quantity in REACTIONS:
+            force, torque, drive, *_ = reactions[_exerting(channel)]
             vector = torque if channel.quantity in MOMENTS else force
             about = torque if drive is None else drive
             found[k] = about[:, None] if channel.quantity == "torque" else vector[:, [axis]]
@@ -173,6 +184,11 @@ def _of_lane(
             x, y, *rest = sensed(scene.markers[channel.marker], channel.tilt).T[..., None]
             found[k] = (c * x + s * y, c * y - s * x, *rest)[axis]
     return found
+
+
+def _exerting(channel: Channel) -> str:
+    """Return the joint or the contact, as `reactions_along` names it."""
+    return f"contacts.{channel.contact}" if channel.joint is None else channel.joint
 
 
 def _course(trajectory: Trajectory, scene: Scene) -> Course:
@@ -211,6 +227,9 @@ def check_sensors(scene: Scene, channels: tuple[Channel, ...]) -> None:
             field = "side" if channel.side else "tilt"
             wanted = "leave it out" if channel.side else "give one angle"
             raise InputError(f"channels: {field}: {scene.name} is a scene in the plane; {wanted}")
+        if channel.contact is not None and channel.contact not in scene.contacts:
+            known = ", ".join(scene.contacts) or "none"
+            raise InputError(f"{what}: no contact {channel.contact!r}; there are {known}")
         if channel.joint is not None:
             _in_a_joint(scene, channel, channel.joint)
         elif channel.quantity == STRAIN:

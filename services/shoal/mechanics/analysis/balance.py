@@ -23,7 +23,7 @@ import scipy.linalg
 import scipy.optimize
 import scipy.sparse
 
-from shoal.mechanics.analysis.evaluate import Evaluation, Evaluator
+from shoal.mechanics.analysis.evaluate import Evaluation, Evaluator, Pressing
 from shoal.mechanics.analysis.freedom import Freedom, Metric
 from shoal.mechanics.analysis.lanczos import is_firm, lowest
 from shoal.mechanics.analysis.rest_contacts import RestContacts
@@ -153,6 +153,12 @@ class Balance:
         idle = {number for number, part in zip(self.closed, self._weights(view), strict=True) if part <= IDLE}
         self.closed = [number for number in self.closed if number not in idle]
         return {self.contacts.names[k]: pressing[k] if k in self.closed else 0.0 for k in touching}
+
+    def pressed(self, q: Array) -> Pressing:
+        """Return what the closed contacts exert at a state, among all contacts of the model."""
+        normal = np.zeros(self.evaluator.gaps.size)
+        normal[self.contacts.numbers[self.closed]] = self.pressing(self.look(q))
+        return self.evaluator.pressed(q, normal)
 
     def _freedom(self, evaluation: Evaluation) -> Freedom | SparseFreedom:
         rows = evaluation.jacobian

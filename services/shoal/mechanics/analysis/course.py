@@ -12,6 +12,7 @@ from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.analysis.felt import TURN, Felt, quarter
 from shoal.mechanics.assembly.build import build
 from shoal.mechanics.frames import RigidFrame
+from shoal.mechanics.gaps import KEPT
 from shoal.mechanics.numerics.tile import Array, Index
 from shoal.scene import Scene
 from shoal.scene.function import Function
@@ -110,7 +111,8 @@ def machine(scene: Scene, values: Mapping[str, Array], course: Course, lane: int
 
 def _quantities(evaluator: Evaluator, course: Course, lane: int, of_model: int) -> Felt:
     rigid = _Rigid(evaluator, course, lane, of_model)
-    return Felt(evaluator, course.times, rigid.q, rigid.v, rigid.way, of_model)
+    none = np.zeros((len(course.times), 0, KEPT))  # machines with contacts are told by their states
+    return Felt(evaluator, course.times, rigid.q, rigid.v, rigid.way, of_model, none)
 
 
 def _followed(paths: list[Function], times: Array) -> tuple[Array, Array]:

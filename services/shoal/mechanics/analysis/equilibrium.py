@@ -31,7 +31,7 @@ class Equilibrium(Concluded):
     eigenvalues: of the reduced stiffness in the metric of the mass [rad^2/s^2], lowest first; all positive means
     stable, but where forces follow the motion; levels: below these each is zero to working accuracy. steps: load steps.
     contacts: the one-sided constraints that are closed, by name, and the forces with which they press [N or N m].
-    reactions: in the joints, None where the forces do not balance, where contacts press, or where not asked for.
+    reactions: in joints and contacts, None where the forces do not balance or where not asked for.
     turns: angles [rad] that force elements have counted, by joint or load; gap_angles: those of contacts, (gaps,).
     estimates: errors of the markers [m] by source, of the mesh and of the theory of slender rods, None where one is not
     known; None where none were looked for.

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.sparse
@@ -21,7 +21,7 @@ from shoal.mechanics.analysis.load_stiffness import driven, in_plane, in_space, 
 from shoal.mechanics.dynamics import derived_rows, work_space
 from shoal.mechanics.elements.families import KERNELS, lay
 from shoal.mechanics.functions import Functions
-from shoal.mechanics.gaps import Gaps
+from shoal.mechanics.gaps import Gaps, enter
 from shoal.mechanics.kernels import ready
 from shoal.mechanics.machine import Machine
 from shoal.mechanics.model import Arrays, Model
@@ -61,25 +61,40 @@ class Evaluation:
         return self.strain + self.gravity + self.applied
 
 
+class Pressing(NamedTuple):
+    """What contacts exert at a state.
+
+    force: along their normal and tangents [N or N m], (contacts, 3); mode: `gaps.STICK` or `gaps.SLIP` of those that
+    rub, (contacts,); axes: normal and tangents of pairs of surfaces, (contacts, 3, 3); gap [m or rad], and of pairs its
+    second derivative for accelerations of zero, (contacts,). No forces at an impact.
+    """
+
+    force: Array
+    mode: Array
+    axes: Array
+    gap: Array
+    bias: Array
+
+
 class Evaluator:
     """Evaluates a model at any state; not for threads, as it keeps the turns that angle forces counted.
 
     lane: of the model; forces and accelerations are available in any lane, all else in the first. one_sided: whether
-    the caller sees to one-sided constraints (`rest_contacts`), which are none of this. Raises InputError else.
+    the caller sees to contacts, which are open unless their state is put in (`contacts`). Raises InputError else.
     """
 
     def __init__(self, model: Model, lane: int = 0, *, one_sided: bool = False) -> None:
         if model.gaps.size and not one_sided:
             raise InputError(
-                f"{model.gap_fields[0]}: motions, equilibria and modes take one-sided constraints, but not yet "
-                "reactions, virtual sensors, steady motions and starts from the end of a run"
+                f"{model.gap_fields[0]}: motions, reactions, sensors, equilibria and modes take one-sided constraints, "
+                "but not yet steady motions and starts from the end of a run"
             )
         if model.signals:
             raise InputError(
                 f"{model.signal_fields[0]}: follows signals, which runs know, but not yet equilibria, modes, "
                 "reactions, virtual sensors and steady motions"
             )
-        self.model = model
+        self.model, self._strikes = model, False
         self._arrays = model.tile(SINGLE, slice(lane, lane + 1))
         self._room = work_space(SINGLE, self._arrays)
         self._arrays = ready(SINGLE, self._arrays, self._room)
@@ -139,6 +154,30 @@ class Evaluator:
     def turns(self, angles: Array) -> None:
         self._room.memory[:] = angles
 
+    def put_contacts(self, kept: Array) -> None:
+        """Let contacts be open, stick or slip as they did at a sample, (contacts, KEPT), see `gaps.keep`."""
+        self._strikes = bool(np.any(np.isnan(kept)))
+        enter(self.gaps, self._room.gaps, np.nan_to_num(kept))
+
+    @property
+    def pressing(self) -> Pressing:
+        """What contacts exert at the state of the last acceleration."""
+        g, size = self._room.gaps, self.gaps.size
+        force, ways = np.zeros((size, 3)), 1 + self.gaps.tangents
+        force[:, :ways] = np.where(g.closed[:, None] != 0.0, g.force.reshape(size, ways), 0.0)
+        force[:] = np.nan if self._strikes else force
+        return self._exerting(force, g.mode * (g.closed != 0.0))
+
+    def pressed(self, q: Array, normal: Array) -> Pressing:
+        """What contacts exert at rest that press with such forces [N or N m], (contacts,), and have no friction."""
+        evaluations.follow_gaps(SINGLE, self._arrays, self._room, q[None], np.zeros((1, len(q))))
+        return self._exerting(np.stack([normal, 0.0 * normal, 0.0 * normal], axis=1), 0.0 * normal)
+
+    def _exerting(self, force: Array, mode: Array) -> Pressing:
+        g, size = self._room.gaps, len(force)
+        bias = g.bias.reshape(size, -1)[:, 0] if size else g.bias
+        return Pressing(force, mode, g.axes.reshape(size, 3, 3).copy(), g.value.copy(), bias.copy())
+
     def remember(self, q: Array) -> None:
         """Count the turns of angle forces after a move of less than half a turn to q."""
         self._enter(q, None)
@@ -161,15 +200,18 @@ class Evaluator:
         """The acceleration by Gauss's principle, (unknowns,)."""
         self._enter(q, v)
         evaluations.accelerate(SINGLE, self._arrays, self._room, t, self.model.scene.solver.rank_tolerance)
-        return self._room.a[: self.model.unknowns].copy()
+        return self._room.a[: self.model.unknowns] * (np.nan if self._strikes else 1.0)
 
-    def along(self, way: Array, sample: Index, v: Array, times: Array) -> tuple[Array, Array]:
+    def along(
+        self, way: Array, sample: Index, v: Array, times: Array, contacts: Array
+    ) -> tuple[Array, Array, list[Pressing]]:
         """Accelerations along a motion, (samples, unknowns), and the angles that angle forces count, (samples, forces).
 
-        way: poses less than half a turn apart, from where they are counted, (poses, unknowns); sample: which one each
-        is, or -1, (poses,); v, (samples, unknowns), and times [s]: of the samples
+        Then what contacts exert. way: poses less than half a turn apart, from where they are counted, (poses,
+        unknowns); sample: which one each is, or -1, (poses,); v, (samples, unknowns), times [s] and contacts, (samples,
+        contacts, KEPT): of the samples
         """
-        a, turns = np.empty_like(v), np.empty((len(v), len(self._room.memory)))
+        a, turns, pressing = np.empty_like(v), np.empty((len(v), len(self._room.memory))), list[Pressing]()
         n, tolerance = self.model.unknowns, self.model.scene.solver.rank_tolerance
         self._enter(way[0], None)
         for k, number in enumerate(sample.tolist()):
@@ -179,9 +221,11 @@ class Evaluator:
             if number >= 0:
                 self._room.zdot[:n] = v[number]
                 turns[number] = self._room.memory
+                self.put_contacts(contacts[number])
                 evaluations.accelerate(SINGLE, self._arrays, self._room, float(times[number]), tolerance)
-                a[number] = self._room.a[:n]
-        return a, turns
+                a[number] = np.nan if self._strikes else self._room.a[:n]
+                pressing.append(self.pressing)
+        return a, turns, pressing
 
     def stored(self, way: Array, turns: Array) -> Array:
         """Strain energy [J] at poses, (poses, unknowns), at which angle forces have counted `turns`, (poses,)."""

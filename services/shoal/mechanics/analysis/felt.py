@@ -12,7 +12,7 @@ from shoal.mechanics import plane
 from shoal.mechanics import rotation as turns_of
 from shoal.mechanics.affine import Affine, points
 from shoal.mechanics.analysis import triads
-from shoal.mechanics.analysis.evaluate import Evaluator
+from shoal.mechanics.analysis.evaluate import Evaluator, Pressing
 from shoal.mechanics.assembly.build import build
 from shoal.mechanics.assembly.groups import place_of
 from shoal.mechanics.ended import named_turns, start_angles
@@ -36,24 +36,27 @@ class Felt:
     """One lane of a machine along its motion.
 
     evaluator: of a model one of whose lanes it is; times [s]: of the samples, the first is the start; q, v: coordinates
-    and rates, (samples, unknowns); way: returns poses from the start on, see `Evaluator.along`; lane: of the model
+    and rates, (samples, unknowns); way: returns poses from the start on, see `Evaluator.along`; lane: of the model;
+    contacts: what they do, see `States`, (samples, contacts, KEPT)
     """
 
     def __init__(
-        self, evaluator: Evaluator, times: Array, q: Array, v: Array, way: Callable[[], tuple[Array, Index]], lane: int
-    ) -> None:
+        self, evaluator: Evaluator, times: Array, q: Array, v: Array, way: Callable[[], tuple[Array, Index]], lane: int,
+        contacts: Array,
+    ) -> None:  # fmt: skip
         self.evaluator, self.times, self.q, self.v, self.lane = evaluator, times, q, v, lane
+        self._contacts = contacts
         self._way = way
         self.scene = scene = evaluator.model.stated
         stated = padded(scene.gravity, scene.dimensions)
         self.gravity = np.array([float(np.ravel(part)[lane % np.size(part)]) for part in stated])
 
     @cached_property
-    def _along(self) -> tuple[Array, Array]:
-        """Accelerations and turns."""
+    def _along(self) -> tuple[Array, Array, list[Pressing]]:
+        """Accelerations, turns and what contacts exert."""
         counted = self.evaluator.model.forces.size > 0
         way, sample = self._way() if counted else (self.q, np.arange(len(self.q)))
-        return self.evaluator.along(way, sample, self.v, np.asarray(self.times, dtype=float))
+        return self.evaluator.along(way, sample, self.v, np.asarray(self.times, dtype=float), self._contacts)
 
     @property
     def a(self) -> Array:
@@ -64,6 +67,11 @@ class Felt:
     def turns(self) -> Array:
         """The angles that angle forces have counted at every sample [rad], (samples, forces)."""
         return self._along[1]
+
+    @property
+    def pressing(self) -> list[Pressing]:
+        """What contacts exert at every sample."""
+        return self._along[2]
 
     def specific_force(self, at: Attachment, tilt: Tilt = 0.0) -> Array:
         """Acceleration less gravity at a place of a body, along axes turned by `tilt` from its own.
@@ -133,7 +141,7 @@ def lanes_of(states: States, times: Array, lanes: list[int]) -> Iterator[Felt]:
         free = build(model.stated, model.lanes, float(times[-1]))
         model = replace(free, q0=model.q0, v0=model.v0, start_angles=model.start_angles)
     for lane in lanes:
-        yield _quantities(Evaluator(model, lane), states, times, lane, lane)
+        yield _quantities(Evaluator(model, lane, one_sided=True), states, times, lane, lane)
 
 
 def lane_of(states: States, times: Array, scene: Scene, values: Mapping[str, Array], lane: int) -> Felt:
@@ -144,12 +152,13 @@ def lane_of(states: States, times: Array, scene: Scene, values: Mapping[str, Arr
     turns = named_turns(begun, begun.start_angles[:, lane % begun.start_angles.shape[1]])
     q, v = (part[0, :, lane, None].copy() for part in (states.q, states.v))
     model = replace(model, q0=q, v0=v, start_angles=start_angles(model, [turns]), shared_tiles={})
-    return _quantities(Evaluator(model), states, times, lane, 0)
+    return _quantities(Evaluator(model, one_sided=True), states, times, lane, 0)
 
 
 def _quantities(evaluator: Evaluator, states: States, times: Array, lane: int, of_model: int) -> Felt:
     q, v = states.q[..., lane], states.v[..., lane]
-    return Felt(evaluator, times, q, v, lambda: _joined(evaluator, times, q, v, of_model), of_model)
+    contacts = states.contacts[..., lane]
+    return Felt(evaluator, times, q, v, lambda: _joined(evaluator, times, q, v, of_model), of_model, contacts)
 
 
 def _joined(evaluator: Evaluator, times: Array, q: Array, v: Array, lane: int) -> tuple[Array, Index]:

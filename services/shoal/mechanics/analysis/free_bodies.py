@@ -1,4 +1,4 @@
-"""The machine taken apart: every body with coordinates of its own, no joints, and all the loads that act on it.
+"""The machine taken apart: every body with coordinates of its own, no joints and contacts, and all loads on it.
 
 Each vector of a body is affine in the machine's coordinates, so the coordinates of the free bodies are S q + s, their
 rates S v and their accelerations S a; what their balance then lacks is what the joints do.
@@ -89,7 +89,7 @@ def _without_joints(scene: Scene, placement: Placement) -> Scene:
         body = scene.bodies[name]
         if isinstance(body, Rod) and body.element == "modal":  # its modes are those of the machine
             bodies[name] = body.model_copy(update={"ends": held(scene, name)})
-    return scene.model_copy(update={"joints": {}, "initial": initial, "bodies": bodies})
+    return scene.model_copy(update={"joints": {}, "contacts": {}, "initial": initial, "bodies": bodies})
 
 
 def _without_joints_in_space(scene: Scene, placement: Placement) -> Scene:
@@ -109,7 +109,7 @@ def _without_joints_in_space(scene: Scene, placement: Placement) -> Scene:
         frame = placement.frames[name]
         if isinstance(frame, BeamFrame) and frame.element.director is not None:
             bodies[name] = bodies[name].model_copy(update={"director": "xyz"[frame.element.director]})
-    return scene.model_copy(update={"joints": {}, "initial": initial, "bodies": bodies})
+    return scene.model_copy(update={"joints": {}, "contacts": {}, "initial": initial, "bodies": bodies})
 
 
 def _with_inertia(scene: Scene) -> tuple[Scene, dict[str, float]]:

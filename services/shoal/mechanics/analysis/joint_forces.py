@@ -46,10 +46,11 @@ class Component(NamedTuple):
 
 def components(motion: FreeMotion) -> list[Component]:
     """Return the unknowns of all joints, in the order of the scene."""
-    return [part for name, one in joints.of_scene(motion.scene) for part in _of_condition(motion, name, one)]
+    return [part for name, one in joints.of_scene(motion.scene) for part in of_condition(motion, name, one)]
 
 
-def _of_condition(motion: FreeMotion, name: str, condition: Any) -> Iterator[Component]:
+def of_condition(motion: FreeMotion, name: str, condition: Any) -> Iterator[Component]:
+    """Yield the unknowns of one condition of a joint."""
     if isinstance(condition, Geared):
         yield _geared(motion, name, condition)
     elif isinstance(condition, Sum):
@@ -58,10 +59,10 @@ def _of_condition(motion: FreeMotion, name: str, condition: Any) -> Iterator[Com
         pushes = condition.pushes(motion)
         twists = _resisted(motion, condition, condition.twists(motion))
         for label in pushes | twists:
-            yield _pair(motion, name, label, condition, pushes.get(label), twists.get(label))
+            yield pair(motion, name, label, condition, pushes.get(label), twists.get(label))
 
 
-def _pair(
+def pair(
     motion: FreeMotion, joint: str, label: str, sides: Any, force: Array | None, torque: Array | None
 ) -> Component:
     """Return a force at the second place and a torque on the second body, and their opposites on the first.
@@ -125,9 +126,9 @@ def friction(motion: FreeMotion, held: Mapping[str, Array]) -> dict[str, Compone
             continue
         if isinstance(joint, Slider):
             along = joint.direction if joint.axis is None else joint.axis
-            unit = _pair(motion, name, "friction", joint, motion.line(joint.first, along), None)
+            unit = pair(motion, name, "friction", joint, motion.line(joint.first, along), None)
         else:
-            unit = _pair(motion, name, "friction", joint, None, motion.pin(joint))
+            unit = pair(motion, name, "friction", joint, None, motion.pin(joint))
         rate = np.einsum("nu,nu->n", unit.gradient, motion.rate)
         found[name] = unit.times(-joint.resistance(rate, held.get(name, 0.0)))
     return found

@@ -13,6 +13,7 @@ class ReactionsStatus(StrEnum):
     OK = "ok"
     INACCURATE = "inaccurate"
     UNBALANCED = "unbalanced"
+    IMPACT = "impact"
 
 
 UNBALANCED = Kind(
@@ -20,6 +21,13 @@ UNBALANCED = Kind(
     Severity.REJECTION,
     "No forces in the joints balance the bodies.",
     implies=ReactionsStatus.UNBALANCED,
+)
+IMPACT = Kind(
+    "impact-at-this-time",
+    Severity.REJECTION,
+    "An impact is at this instant: there are impulses, and no forces.",
+    "ask for a time before or after it",
+    ReactionsStatus.IMPACT,
 )
 INACCURATE = Kind(
     "forces-inaccurate",

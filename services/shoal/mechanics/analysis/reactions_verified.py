@@ -41,9 +41,13 @@ def verified(scene: Scene, times: Sequence[float]) -> list[Reactions]:
     """Reactions at times [s] with their errors. Raises InputError, ComputationError.
 
     They are inaccurate where no two runs with other steps agree within SHARE. Errors of the mesh and
-    of the theory of slender rods are added to those of the steps.
+    of the theory of slender rods are added to those of the steps. At an impact there are none.
     """
     stated = reactions(scene, times)
+    between = [one.time for one in stated if not one.impacts]
+    if len(between) < len(stated):
+        smooth = iter(verified(scene, between) if between else ())
+        return [one if one.impacts else next(smooth) for one in stated]
     found, other, remarks = _in_time(stated, scene, times)
 
     def run(source: str, finer: Scene) -> list[Reactions]:
@@ -101,7 +105,8 @@ def _others(scene: Scene) -> Iterator[dict[str, Any]]:
     names: tuple[str, ...] = (name,)
     tolerances = (100 * solver.relative_tolerance, max(0.1 * solver.relative_tolerance, 1e-14))
     if not facts(name).adaptive:
-        names, tolerances = ("dop853", "radau5"), (1e-7, 1e-9)
+        names = ("dop853",) if model.gaps.size else ("dop853", "radau5")
+        tolerances = 1e-7, 1e-9
     elif solver.relative_tolerance > _TIGHT:
         tolerances = 0.01 * solver.relative_tolerance, 1e-4 * solver.relative_tolerance
     steps = min(solver.max_steps, _MOST) if not facts(name).adaptive else solver.max_steps
@@ -121,9 +126,16 @@ def _others(scene: Scene) -> Iterator[dict[str, Any]]:
 
 
 def _differences(one: Reactions, other: Reactions) -> Array:
-    """Return the distances of the force [N] and of the torque [N m] of every joint, (joints, 2)."""
-    pairs = [(joint, other.joints[name]) for name, joint in one.joints.items()]
-    return _sizes([(np.subtract(a.force, b.force), np.subtract(a.torque, b.torque)) for a, b in pairs])
+    """Return the distances of the force [N] and of the torque [N m] of every joint and contact, (joints, 2)."""
+    return _sizes(
+        [(np.subtract(a, b), np.subtract(c, d)) for (a, c), (b, d) in zip(_all(one), _all(other), strict=True)]
+    )
+
+
+def _all(one: Reactions) -> list[tuple[Any, Any]]:
+    """Return force and torque of every joint, then those of every contact."""
+    joints = [(joint.force, joint.torque) for joint in one.joints.values()]
+    return joints + [(contact.force, 0.0) for contact in one.contacts.values()]
 
 
 def _sizes(vectors: Iterable[tuple[Any, Any]]) -> Array:
@@ -135,18 +147,21 @@ def _apart(found: list[Reactions], other: list[Reactions], lever: float) -> floa
     """The largest error over the largest force at these times, torques counted at a lever [m]; nan if one is none."""
     units = np.array([1.0, lever])
     error = np.max([_differences(one, two) / units for one, two in zip(found, other, strict=True)], initial=0.0)
-    sizes = [_sizes((joint.force, joint.torque) for joint in one.joints.values()) / units for one in other]
+    sizes = [_sizes(_all(one)) / units for one in other]
     return 0.0 if error <= CANCELLED * max(one.scale for one in other) else float(error / np.max(sizes))
 
 
 def _with_errors(found: Reactions, errors: Mapping[str, Array | None]) -> Reactions:
-    """Return reactions with the sum of the known errors of each joint."""
+    """Return reactions with the sum of the known errors of each joint and contact."""
     known = [each for each in errors.values() if each is not None]
     if not known:
         return found
-    pairs = zip(found.joints.items(), np.sum(known, axis=0).tolist(), strict=True)
+    total, count = np.sum(known, axis=0).tolist(), len(found.joints)
+    pairs = zip(found.joints.items(), total[:count], strict=True)
     joints = {name: replace(joint, force_error=force, torque_error=torque) for (name, joint), (force, torque) in pairs}
-    return replace(found, joints=joints)
+    others = zip(found.contacts.items(), total[count:], strict=True)
+    contacts = {name: replace(contact, force_error=force) for (name, contact), (force, _) in others}
+    return replace(found, joints=joints, contacts=contacts)
 
 
 def _largest(errors: list[Array | None]) -> float | None:

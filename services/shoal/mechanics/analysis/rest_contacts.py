@@ -24,8 +24,9 @@ if TYPE_CHECKING:
 class RestContacts:
     """The gaps g(q) >= 0 of a model, in its first lane; not for threads, as it counts turns.
 
-    names: of every gap. Friction is left out: that of a joint that sticks has no gap. Pairs of surfaces are distances,
-    or places along a normal, like the measures of joints. Raises InputError for contacts that give way.
+    names: of every gap; numbers: among the contacts of the model. Friction is left out: that of a joint that sticks has
+    no gap. Pairs of surfaces are distances, or places along a normal, like the measures of joints. Raises InputError
+    for contacts that give way.
     """
 
     def __init__(self, evaluator: Evaluator) -> None:
@@ -38,7 +39,7 @@ class RestContacts:
         self._angles = measured.size
         joined = (np.concatenate(parts) for parts in zip(measured[2:], of_pairs[2:], strict=True))
         self._measures = Forces(measured.dimensions, measured.size + of_pairs.size, *joined)
-        kept = np.flatnonzero(gaps.kind != DRY)
+        self.numbers = kept = np.flatnonzero(gaps.kind != DRY)
         self.size = len(kept)
         weight = np.append(gaps.weight, np.where(gaps.pairs.shape == HOLE, -1.0, 1.0))
         parts = [

@@ -253,11 +253,13 @@ class _Search:
         rest = np.zeros_like(q)
         eigenvalues, levels, _ = self._eigen(q)
         is_pressed = any(self.pressing.values())
-        known = balanced and not is_pressed
-        react = cache(lambda: reactions_of(self.evaluator, q, rest, rest, self.time)) if known else None
+        pressed = self.balance.pressed(q) if is_pressed else None
+        react = (
+            cache(lambda: reactions_of(self.evaluator, q, rest, rest, self.time, pressing=pressed))
+            if balanced
+            else None
+        )
         neglected = [left_out.friction(self.scene, react), left_out.driven(self.evaluator, q, self.time)]
-        if is_pressed and self.reactions:
-            neglected.append(f"reactions of joints are left out where contacts press ({', '.join(self.pressing)})")
         rubbing = (name for name, one in self.scene.contacts.items() if one.rubs)
         if rough := [name for name in rubbing if f"contacts.{name}" in self.pressing]:
             neglected.append(f"friction is left out ({', '.join(rough)}): the surfaces may stick at other places, too")

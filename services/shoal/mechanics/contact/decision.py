@@ -46,6 +46,7 @@ def decide(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float) -> None:
     for at in range(size * width):
         near = g.value[at] <= m.gaps.resolution and m.gaps.soft[at // width] == RIGID
         state[at] = TOUCHES if g.hit[at] == HIT or g.closed[at] != 0.0 or near else APART
+        g.impulse[at] = 0.0
         if g.hit[at] == HIT:
             g.speed[at] = -g.rate[at]
         if g.hit[at] == LIFT:
@@ -111,7 +112,7 @@ def _strike(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float, state: A
         some = some or _strikes(size, width, lane, g.hit)
     if not some:
         return
-    before, plastic, impulse = np.zeros(n * width), np.zeros(size * width), np.zeros(size * width)
+    before, plastic = np.zeros(n * width), np.zeros(size * width)
     for i in range(n * width):
         before[i] = w.zdot[i]
     closed, touching = np.zeros(size * width), state.copy()
@@ -125,7 +126,7 @@ def _strike(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float, state: A
         response.respond(tile, m, w, t, w.z, w.zdot, tolerance, state)
         for lane in range(width):
             if _strikes(size, width, lane, g.hit):
-                outcome = impact.strike(tile, m, w, lane, state, plastic, impulse)
+                outcome = impact.strike(tile, m, w, lane, state, plastic, g.impulse)
                 if outcome != FINE:
                     _end(m, w, t, width, lane, outcome)
         _release(tile, m, w, t, tolerance, state)
@@ -146,8 +147,8 @@ def _strike(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float, state: A
         for contact in range(size):
             at = contact * width + lane
             meets = g.hit[at] == HIT and m.gaps.kind[contact] != DRY and t > 0.0
-            if meets or (closed[at] == 0.0 and impulse[at] > 0.0):
-                log(m, w, t, contact, width, lane, HIT if m.gaps.soft[contact] == RIGID else MEET, impulse[at])
+            if meets or (closed[at] == 0.0 and g.impulse[at] > 0.0):
+                log(m, w, t, contact, width, lane, HIT if m.gaps.soft[contact] == RIGID else MEET, g.impulse[at])
 
 
 @njit(cache=True, error_model="numpy")

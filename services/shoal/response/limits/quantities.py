@@ -38,6 +38,11 @@ REACTIONS = {
 }
 """What a joint exerts on its second body, along the axes of the ground; force: its size; torque: in space that of a
 drive about its axis."""
+CONTACTS = {
+    2: {"normal": "N", "friction": "N", "fx": "N", "fy": "N", "force": "N"},
+    3: {"normal": "N", "friction": "N", **FORCES, "force": "N"},
+}
+"""What a contact exerts on its first body; friction: in the plane along the normal turned clockwise, else its size."""
 SECTIONS = {
     2: {"normal": "N", "shear": "N", "moment": "N m"},
     3: {"normal": "N", "shear": "N", "moment": "N m", "torsion": "N m"},
@@ -48,7 +53,7 @@ STRAINS = {"strain": "m/m", "strain_above": "m/m", "strain_below": "m/m"}
 """Of a flexible rod at a marker: of its axis, and at half its height to either side of it."""
 UNITS = {
     name: unit
-    for table in (*MARKERS.values(), *REACTIONS.values(), *SECTIONS.values(), STRAINS, ENERGIES)
+    for table in (*MARKERS.values(), *REACTIONS.values(), *CONTACTS.values(), *SECTIONS.values(), STRAINS, ENERGIES)
     for name, unit in table.items()
 }
 _BENT = ("curvature", "side_curvature", "twist")
@@ -62,10 +67,11 @@ def of_section(quantity: str, scene: Scene) -> bool:
 
 def needs_states(quantity: str, scene: Scene) -> bool:
     """Return whether the quantity takes more than the motion of the bodies of a rigid machine in the plane."""
-    if of_section(quantity, scene):
+    if of_section(quantity, scene) or quantity == "friction":
         return True
     dynamic = quantity in ENERGIES or quantity in REACTIONS[scene.dimensions]
-    return dynamic and (scene.dimensions == 3 or any(body.element != "rigid" for body in scene.bodies.values()))
+    bends = any(body.element != "rigid" for body in scene.bodies.values())
+    return dynamic and (scene.dimensions == 3 or bends or scene.touches)
 
 
 def check(place: str, quantity: str, scene: Scene) -> None:
@@ -75,16 +81,21 @@ def check(place: str, quantity: str, scene: Scene) -> None:
         if place:
             raise InputError(f"{quantity} is that of the whole machine, not of {place!r}; write {quantity} alone")
         return
+    if place in scene.contacts and quantity in CONTACTS[d]:
+        return
     of_markers = {**MARKERS[d], **STRAINS, **SECTIONS[d]}
-    if quantity not in of_markers and quantity not in REACTIONS[d]:
+    if quantity not in of_markers and quantity not in REACTIONS[d] and not (scene.contacts and quantity in CONTACTS[d]):
+        of_contacts = f"{', '.join(CONTACTS[d])} of a contact, " if scene.contacts else ""
         raise InputError(
             f"no quantity {quantity!r}; there are {', '.join(MARKERS[d])} of a marker, "
             f"{', '.join([*SECTIONS[d], *STRAINS])} of a marker on a flexible rod, {', '.join(REACTIONS[d])} of a "
-            f"joint, and {', '.join(ENERGIES)} of the machine"
+            f"joint, {of_contacts}and {', '.join(ENERGIES)} of the machine"
         )
     kind, known, others = "marker", list(scene.markers), list(scene.joints)
     if quantity in REACTIONS[d]:
         kind, known, others = "joint", others, known
+    elif quantity == "friction" or place in scene.contacts:
+        kind, known, others = "contact", list(scene.contacts), known
     there = f"there are {', '.join(known)}" if known else "there are none"
     if not place:
         raise InputError(f"{quantity} is that of a {kind}; write {kind.upper()}.{quantity}, {there}")
@@ -229,9 +240,13 @@ def _of_lane(one: Felt, quantity: str, place: str) -> Array:
     if quantity in STRAINS:
         at = one.scene.markers[place]
         return one.strain(at, _height(one, at, quantity), 0.0)
-    if place in one.scene.markers:
+    if place in one.scene.contacts and quantity in CONTACTS[one.scene.dimensions]:
+        place = f"contacts.{place}"
+    elif place in one.scene.markers:
         return np.asarray(getattr(section_along(one, one.scene.markers[place]), quantity))
-    force, torque, drive = reactions_along(one, (place,))[place]
+    force, torque, drive, normal, friction = reactions_along(one, (place,))[place]
+    if quantity in ("normal", "friction"):
+        return np.asarray(normal if quantity == "normal" else friction)
     if quantity == "torque":
         return torque if drive is None else drive
     if quantity == "force":

@@ -172,7 +172,11 @@ def equilibrium_table(equilibrium: Equilibrium) -> None:
 def reactions_table(found: list[Reactions]) -> None:
     """Print the reactions of every joint on its second body; in space the forces, then the torques."""
     for reactions in found:
+        if reactions.contacts:
+            _contacts(reactions)
         joints = reactions.joints
+        if not joints:
+            continue
         when = f"on the second body at t = {reactions.time:g} s"
         forces = np.array([joint.force for joint in joints.values()])
         torques = np.array([np.atleast_1d(joint.torque) for joint in joints.values()])
@@ -193,6 +197,20 @@ def reactions_table(found: list[Reactions]) -> None:
     screen.findings(next((one for one in found if not one.ok), found[0]))
     if found[0].errors.estimates:
         screen.say(f"estimated error of the forces, largest of all joints: {found[0].errors}")
+
+
+def _contacts(reactions: Reactions) -> None:
+    """Print where contacts touch, and their forces on the first body."""
+    known = all(one.force_error is not None for one in reactions.contacts.values())
+    errors = [_ERRORS["force"]] if known else []
+    axes = [f"{axis} [m]" for axis in "xyz"[: len(next(iter(reactions.contacts.values())).at)]]
+    title = f"contact forces on the first body at t = {reactions.time:g} s"
+    table = screen.table(title, "contact", "state", *axes, "normal [N]", "friction [N]", *errors, "unique")
+    for name, one in reactions.contacts.items():
+        numbers = (f"{value:.6g}" for value in (*one.at, one.normal, one.friction))
+        error = [] if one.force_error is None else [f"{one.force_error:.1e}"]
+        table.add_row(name, one.state, *numbers, *error, "yes" if one.unique else "no")
+    screen.out.print(table)
 
 
 _ERRORS = {"force": "error [N]", "torque": "error [N m]"}
