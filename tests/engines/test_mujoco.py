@@ -88,7 +88,7 @@ def test_stops_are_limits_whose_error_falls_with_their_stiffness(dimensions: int
         assert theirs.ok, theirs.message
         assert any(event["kind"] == "impact" for event in ours.model["events"])
         apart.append(ours.distance(theirs))
-        stiff.append(theirs.model["limits"]["H"]["stiffness"])
+        stiff.append(theirs.model["contacts"]["joints.H.stops"]["stiffness"])
     assert stiff[1] == pytest.approx(400 * stiff[0])
     assert apart[1] < 0.2 * apart[0]
     assert apart[1] < 0.01
@@ -106,3 +106,69 @@ def test_a_limit_gives_back_what_the_stop_does(restitution: float) -> None:
     way = solve_ivp(lambda _, y: [y[1], -y[0] - 2.0 * ratio * y[1]], (0.0, 50.0), [0.0, -1.0], events=released,
                     rtol=1e-10, atol=1e-12)  # fmt: skip
     assert way.y[1, -1] == pytest.approx(restitution, abs=1e-6)
+
+
+BALL = {"kind": "rigid-body", "mass": 1.0, "inertia": 0.004}
+GROUND = {"body": "ground", "point": [0.0, 0.0]}
+
+
+def touching(start: dict[str, Any], bodies: int = 1, **more: Any) -> Scene:
+    """Return balls, the first of which starts somehow, beside one at rest."""
+    names = "AB"[:bodies]
+    return Scene.parse({
+        "name": "touching", "bodies": dict.fromkeys(names, BALL), "markers": {"A": {"body": "A"}},
+        "initial": {"A": start} | ({"B": {"position": [0.5, 0.05]}} if bodies > 1 else {}),
+        "solver": {"duration": 0.8, "samples": 100}, **more,
+    })  # fmt: skip
+
+
+def contact(second: dict[str, Any], **law: Any) -> dict[str, Any]:
+    return {"C": {"first": {"body": "A", "radius": 0.1}, "second": second, **law}}
+
+
+FALLING = {"position": [0.0, 0.6], "velocity": [1.0, 0.0]}
+TOUCHING = {
+    "circle-on-line": touching(FALLING, contacts=contact(GROUND | {"line": 0.1}, restitution=0.7)),
+    "two-circles": touching({"position": [0.0, 0.0], "velocity": [1.0, 0.0]}, 2,
+                            contacts=contact({"body": "B", "radius": 0.1}, restitution=0.7)),
+    "strut": touching({"position": [0.1, 0.9]}, solver={"duration": 0.5, "samples": 100},
+                      joints={"J": {"kind": "distance", "keeps": "at-least", "length": 0.7, "restitution": 0.5,
+                                    "first": GROUND, "second": {"body": "A"}}}),
+}  # fmt: skip
+
+
+@pytest.mark.compiles("kernels of contacts, which few machines need")
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name == "strut")) for name in TOUCHING]
+)
+def test_the_distance_from_rigid_contacts_falls_with_their_stiffness(name: str) -> None:
+    found = compare(TOUCHING[name], ["gauss", "mujoco"])
+    assert found.ok, found.complaint
+    row = found.compliance()["mujoco"]
+    assert row["distances"][2] < 0.5 * row["distances"][0]
+    assert not row["disagrees"]
+
+
+@pytest.mark.compiles("kernels of contacts, which few machines need")
+def test_a_sliding_contact_separates_by_the_associated_law_of_friction() -> None:
+    """MuJoCo's convex law, no error of its springs: what slides by v leaves the surface by mu v; ours does not."""
+    start = {"position": [0.0, 0.6], "velocity": [2.0, 0.0], "rate": 10.0}
+    scene = touching(start, contacts=contact(GROUND | {"line": 0.0}, restitution=0.7, mu=0.2))
+    row = compare(scene, ["gauss", "mujoco"]).compliance()["mujoco"]
+    assert row["disagrees"]
+    assert row["rigid"] > 3.0 * (row["penalty"] + row["uncertainty"])
+
+
+@pytest.mark.parametrize(
+    ("second", "law", "field"),
+    [
+        (GROUND | {"hole": 0.8}, {}, "second.hole"),
+        (GROUND | {"line": 0.0}, {"rolling": True}, "rolling"),
+        (GROUND | {"line": 0.0}, {"law": {"stiffness": 1e5}}, "law"),
+        ({"body": "B", "line": 0.0}, {}, "second.line"),
+    ],
+)
+def test_contacts_that_mujoco_has_not_are_refused_by_name(second: Any, law: dict[str, Any], field: str) -> None:
+    scene = touching(FALLING | {"position": [0.0, 0.3]}, 2, contacts=contact(second, **law))
+    with pytest.raises(InputError, match=rf"^contacts\.C\.{field}: contacts of MuJoCo have no counterpart"):
+        get_engine("mujoco").simulate(scene)

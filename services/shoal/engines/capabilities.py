@@ -95,10 +95,10 @@ def needs(scene: Scene) -> Iterator[tuple[str, str]]:
 
 def _item(where: str, item: Joint | Load) -> Iterator[tuple[str, str]]:
     """The kind of a joint or a load, and what its fields need beyond that."""
-    yield where, item.kind
+    # A rope or a strut is no bar.
+    one_sided = getattr(item, "keeps", "exactly") != "exactly"
+    yield (f"{where}.keeps", "one-sided distances") if one_sided else (where, item.kind)
     for field, value in item:
-        if field == "keeps" and value != "exactly":
-            yield f"{where}.keeps", "one-sided distances"
         if field == "stick" and value == "exact":
             yield f"{where}.stick", "exact stick"
         if field in _FIELDS and value:

@@ -1,4 +1,4 @@
-"""MuJoCo behind the engine contract: open chains of rigid bodies, without contacts; stops are limits that give way."""
+"""MuJoCo behind the engine contract: open chains of rigid bodies; stops, ropes and contacts give way."""
 
 from __future__ import annotations
 
@@ -49,7 +49,9 @@ class MujocoEngine(OneByOne):
             elements=frozenset({"rigid"}),
             joints=frozenset({"revolute", "spherical", "slider", "weld"}),
             loads=frozenset(),
-            features=frozenset({"machines in space", "stops"}),
+            features=frozenset(
+                {"machines in space", "free bodies", "point masses", "stops", "one-sided distances", "contacts"}
+            ),
             lanes=False,
         )
 
@@ -62,14 +64,14 @@ class MujocoEngine(OneByOne):
         except InputError as error:
             soft = "; MuJoCo's are soft and open" if "closed loops" in str(error) else ""
             raise InputError(f"{error}{soft}") from None
-        return self.run(Mjcf(scene, stops=True), wanted, started)
+        return self.run(Mjcf(scene, soft=True), wanted, started)
 
     def run(self, machine: Mjcf, wanted: Array, started: float | None = None) -> Trajectory:
         """Run what MJCF says, soft constraints and all: their energy and the work of loads are not followed."""
         started = time.perf_counter() if started is None else started
         mujoco, scene = library(), machine.scene
         model, data = loaded(mujoco, machine)
-        followed = not (model.neq or model.nu or scene.loads or machine.limits or np.any(model.dof_frictionloss))
+        followed = not (model.neq or model.nu or scene.loads or machine.springs or np.any(model.dof_frictionloss))
         with quiet(mujoco):
             points, angles, drift, steps = _march(mujoco, model, data, scene, wanted)
         found: list[Finding] = []
@@ -77,8 +79,8 @@ class MujocoEngine(OneByOne):
             found = [kinds.NOT_FINITE.found("the motion is not finite", "use a smaller solver.step")]
         elif followed and not drift <= scene.solver.energy_tolerance:
             found = [kinds.ENERGY.found(f"energy is off by {drift:.3g}", "reduce solver.step", drift=drift)]
-        stiff = {name: one._asdict() for name, one in machine.limits.items()}
-        started_as = facts(scene, machine.initial, span(scene)) | ({"limits": stiff} if stiff else {})
+        stiff = {name: one._asdict() for name, one in machine.springs.items()}
+        started_as = facts(scene, machine.initial, span(scene)) | ({"contacts": stiff} if stiff else {})
         return Trajectory(
             engine=self.name,
             times=wanted,

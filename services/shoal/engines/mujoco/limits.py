@@ -1,4 +1,4 @@
-"""Stops of joints as MuJoCo's limits: springs with dampers that push and do not pull, for a second opinion."""
+"""Stops, ropes and struts as MuJoCo's limits: springs with dampers that push and do not pull, for a second opinion."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from shoal.mechanics.machine import Machine
-from shoal.scene import Scene
+from shoal.scene import Distance, Scene
 from shoal.scene.joints import Stops
 
 STEPS = 20.0
@@ -19,33 +19,48 @@ FAR = 1e9
 """Range to a side without a stop [rad or m]."""
 
 
-class Limit(NamedTuple):
-    """A limit of MuJoCo's. range: of the joint's coordinate, which is zero at the start [rad or m]
+class SpringDamper(NamedTuple):
+    """A spring with a damper that does not pull. stiffness [1/s^2] and damping [1/s]: per mass that it feels"""
 
-    stiffness [1/s^2] and damping [1/s]: per mass that the limit feels
-    """
-
-    range: tuple[float, float]
     stiffness: float
     damping: float
+
+    @classmethod
+    def of(cls, restitution: float, step: float) -> SpringDamper:
+        """Return the one that gives back so much of the rate, as stiff as a step [s] resolves."""
+        rate = np.pi / (STEPS * step)
+        return cls(rate**2, 2.0 * damping_ratio(restitution) * rate)
+
+    def attributes(self, of: str) -> dict[str, str]:
+        """Return the attributes of MJCF; of: a limit, or nothing of a contact."""
+        return {f"solimp{of}": "0.9999 0.9999 0.001 0.5 2", f"solref{of}": f"{-self.stiffness!r} {-self.damping!r}"}
+
+
+class Limit(NamedTuple):
+    """A limit of MuJoCo's. range: of a joint's coordinate, which is zero at the start, or of a length [rad or m]"""
+
+    range: tuple[float, float]
+    spring: SpringDamper
 
     @property
     def attributes(self) -> dict[str, str]:
         """Return the attributes of MJCF."""
         low, high = self.range
-        return {
-            "limited": "true", "range": f"{low!r} {high!r}", "solimplimit": "0.9999 0.9999 0.001 0.5 2",
-            "solreflimit": f"{-self.stiffness!r} {-self.damping!r}",
-        }  # fmt: skip
+        return {"limited": "true", "range": f"{low!r} {high!r}", **self.spring.attributes("limit")}
 
 
 def limit_of(stops: Stops, start: float, sign: float, step: float) -> Limit:
     """Return the limit of a joint. start: of its free motion [rad or m]; sign: of MuJoCo's coordinate against that."""
     low, high = (None if end is None else sign * (end - start) for end in (stops.min, stops.max))
     low, high = (low, high) if sign > 0 else (high, low)
-    rate = np.pi / (STEPS * step)
-    damping = 2.0 * damping_ratio(stops.restitution) * rate
-    return Limit((-FAR if low is None else float(low), FAR if high is None else float(high)), rate**2, damping)
+    ends = (-FAR if low is None else float(low), FAR if high is None else float(high))
+    return Limit(ends, SpringDamper.of(stops.restitution, step))
+
+
+def limit_of_length(joint: Distance, length: float, step: float) -> Limit:
+    """Return the limit of a rope's or a strut's length [m]."""
+    ends = (0.0, length) if joint.keeps == "at-most" else (length, FAR)
+    return Limit(ends, SpringDamper.of(joint.restitution, step))
 
 
 def damping_ratio(restitution: float) -> float:

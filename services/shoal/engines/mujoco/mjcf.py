@@ -10,7 +10,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from shoal.engines.capabilities import check_acceleration
-from shoal.engines.mujoco.limits import Limit, limit_of, start_of_hinges
+from shoal.engines.mujoco.contacts import POINT, pairs
+from shoal.engines.mujoco.limits import Limit, SpringDamper, limit_of, limit_of_length, start_of_hinges
 from shoal.engines.mujoco.links import Freedom, LinkTree, TreeLink, local, where
 from shoal.engines.mujoco.refused import require_counterparts
 from shoal.engines.tree.scene import started
@@ -34,6 +35,7 @@ from shoal.scene import (
     TorsionSpring,
     Weld,
 )
+from shoal.scene.contacts import ContactSurface
 from shoal.scene.dimensions import padded
 from shoal.scene.sections import Tube
 
@@ -53,12 +55,13 @@ class Mjcf:
     text: the file; rates: of MuJoCo's joints at the start; soft: joints and the like that its soft constraints keep
     """
 
-    def __init__(self, scene: Scene, *, stops: bool = False) -> None:
-        """stops: whether those of joints are written, as limits that give way."""
+    def __init__(self, scene: Scene, *, soft: bool = False) -> None:
+        """soft: whether stops, ropes and contacts are written, as ones that give way."""
         check_acceleration(scene)
-        require_counterparts(scene, stops=stops)
+        require_counterparts(scene, soft=soft)
         self.scene = scene
-        self.limits: dict[str, Limit] = {}
+        self.pairs = pairs(scene)
+        self.springs: dict[str, SpringDamper] = {f"contacts.{one.name}": one.spring for one in self.pairs}
         limited = any(getattr(joint, "stops", None) is not None for joint in scene.joints.values())
         self._hinges = start_of_hinges(scene) if limited else {}
         self._size = span(scene)
@@ -81,8 +84,10 @@ class Mjcf:
             "timestep": repr(scene.solver.step),
             "iterations": "200",
         }
-        option = _under(root, "option", **options, integrator="RK4", tolerance="1e-14")
-        _under(option, "flag", contact="disable", energy="enable")
+        # An elliptic cone, and friction so much stiffer than the normal force: what sticks creeps least.
+        cone = {"cone": "elliptic", "impratio": "10"} if self.pairs else {}
+        option = _under(root, "option", **options, **cone, integrator="RK4", tolerance="1e-14")
+        _under(option, "flag", contact="enable" if self.pairs else "disable", energy="enable")
         world = _under(root, "worldbody")
         self._grow(world, GROUND, links)
         for part, entries in parts.items():
@@ -103,6 +108,10 @@ class Mjcf:
         begin = self._begin[body]
         for name, place in self._sites.get(body, []):
             _under(element, "site", name=name, pos=_numbers(place))
+        for one in self.pairs:
+            for side, surface in (("first", one.first), ("second", one.second)):
+                if surface.body == body:
+                    self._surface(element, f"{one.name}-{side}", surface)
         for link in links:
             if link.parent != body:
                 continue
@@ -116,6 +125,20 @@ class Mjcf:
                 self._joint(child, link, number, freedom)
             self._shapes(child, link.name)
             self._grow(child, link.name, links)
+
+    def _surface(self, element: ElementTree.Element, name: str, surface: ContactSurface) -> None:
+        """A sphere or a plane that touches nothing but in its pair."""
+        options = {"name": name, "pos": _numbers(local(self.scene, surface)), "contype": "0", "conaffinity": "0",
+                   "mass": "0"}  # fmt: skip
+        if surface.shape == "round":
+            radius = surface.radius or POINT * self._size
+            _under(element, "geom", type="sphere", size=repr(float(radius)), **options)
+            return
+        if surface.line is None:
+            normal = self._axis(surface, surface.plane)
+        else:
+            normal = np.array([-np.sin(surface.line), np.cos(surface.line), 0.0])
+        _under(element, "geom", type="plane", size="1 1 1", zaxis=_numbers(normal), **options)
 
     def _inertia(self, element: ElementTree.Element, name: str) -> None:
         body = self.scene.bodies[name]
@@ -153,8 +176,9 @@ class Mjcf:
         if (kind == "hinge" and isinstance(joint, Revolute)) or (kind == "slide" and isinstance(joint, Slider)):
             options |= self._forces(link, joint)
             if joint.stops is not None:
-                self.limits[link.joint] = self._limit(link, joint, axis)
-                options |= self.limits[link.joint].attributes
+                limit = self._limit(link, joint, axis)
+                self.springs[f"joints.{link.joint}.stops"] = limit.spring
+                options |= limit.attributes
         _under(element, "joint", **options)
         speed = own.speed(link.place) - parent.speed(link.place)
         self.rates += {"slide": [speed @ axis], "hinge": [turning @ axis], "ball": [*(own.axes.T @ turning)]}[kind]
@@ -214,7 +238,9 @@ class Mjcf:
 
     def _tendons_and_actuators(self) -> dict[str, list[ElementTree.Element]]:
         """Return the elements outside of the tree: loads, and joints that close loops."""
-        found: dict[str, list[ElementTree.Element]] = {"tendon": [], "equality": [], "actuator": []}
+        found: dict[str, list[ElementTree.Element]] = {"tendon": [], "equality": [], "actuator": [],
+                                                   "contact": []}  # fmt: skip
+        found["contact"] += [_element("pair", name=one.name, **one.attributes) for one in self.pairs]
         for name, load in self.scene.loads.items():
             if isinstance(load, Spring):
                 rest = self._apart(load.first, load.second) if load.length is None else load.length
@@ -228,6 +254,9 @@ class Mjcf:
         for name, joint in self.scene.joints.items():
             if name in self._hung:
                 continue
+            if isinstance(joint, Distance) and joint.keeps != "exactly":
+                found["tendon"].append(self._rope(name, joint))
+                continue
             self.soft.append(f"joints.{name}")
             assert not isinstance(joint, list)
             if isinstance(joint, Distance):
@@ -236,6 +265,15 @@ class Mjcf:
             else:
                 found["equality"] += self._closing(name, joint)
         return found
+
+    def _rope(self, name: str, joint: Distance) -> ElementTree.Element:
+        """A rope or a strut: the limit of a length."""
+        length = self._apart(joint.first, joint.second) if joint.length is None else float(joint.length.number or 0.0)
+        limit = limit_of_length(joint, length, self.scene.solver.step)
+        self.springs[f"joints.{name}"] = limit.spring
+        tendon = self._tendon(name, joint.first, joint.second, {})
+        tendon.attrib.update(limit.attributes)
+        return tendon
 
     def _closing(self, name: str, joint: Any) -> Iterator[ElementTree.Element]:
         """A joint that closes a loop, by constraints."""

@@ -24,10 +24,10 @@ LOADS = (Spring, TorsionSpring, Force, Torque)
 """Kinds that have a counterpart in MJCF."""
 
 
-def require_counterparts(scene: Scene, *, stops: bool = False) -> None:
+def require_counterparts(scene: Scene, *, soft: bool = False) -> None:
     """Raises InputError that names a feature of a scene without a counterpart, of those seen without its tree.
 
-    stops: whether those of joints are accepted
+    soft: whether stops, ropes and contacts are accepted, as ones that give way
     """
     for name, body in scene.bodies.items():
         if name == "world":
@@ -38,7 +38,7 @@ def require_counterparts(scene: Scene, *, stops: bool = False) -> None:
         raise InputError("initial.from: MJCF states a start; it has neither statics nor other runs")
     for name in scene.ground_points:
         raise InputError(f"ground_points.{name}: MJCF has no functions of time")
-    for name in scene.contacts:
+    for name in () if soft else scene.contacts:
         raise InputError(f"contacts.{name}: not written as MJCF; there contacts give way, and its friction creeps")
     for name, joint in scene.joints.items():
         if getattr(joint, "play", None) is not None:
@@ -51,9 +51,9 @@ def require_counterparts(scene: Scene, *, stops: bool = False) -> None:
             raise InputError(f"joints.{name}.mu: MJCF has no friction by the force of a joint")
         if isinstance(joint, Revolute | Slider) and joint.drag:
             raise InputError(f"joints.{name}.drag: MJCF has no quadratic drag of a joint")
-        if isinstance(joint, Revolute | Slider) and joint.stops is not None and not stops:
+        if isinstance(joint, Revolute | Slider) and joint.stops is not None and not soft:
             raise InputError(f"joints.{name}.stops: not written as MJCF; there its limits would give way")
-        if isinstance(joint, Distance) and joint.keeps != "exactly":
+        if isinstance(joint, Distance) and joint.keeps != "exactly" and not soft:
             raise InputError(f"joints.{name}.keeps: not written as MJCF; there a limit of a length would give way")
         if isinstance(joint, Distance) and joint.length is not None and joint.length.number is None:
             raise InputError(f"joints.{name}.length: MJCF has no functions of time")
