@@ -416,6 +416,8 @@ ONLY_NATIVE = [
         initial={"A": {"position": [0.6, -0.8], "velocity": [0.0, 0.0]}},
     ),
     pendulum("stopped", joints={"O": PIN["O"] | {"stops": {"min": -4.0, "restitution": 0.5}}}),
+    pendulum("loose", joints={"O": PIN["O"] | {"play": 0.01, "radius": 0.01}}),
+    pair("loose-gears", {"G": joint(at("A"), at("B"), "gear", ratio=-2, backlash=0.01)}),
     pendulum("sticking", joints={"O": PIN["O"] | {"coulomb": 0.1, "stick": "exact"}}),
     scene(
         "bouncing",
