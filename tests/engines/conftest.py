@@ -417,7 +417,10 @@ ONLY_NATIVE = [
     ),
     pendulum("stopped", joints={"O": PIN["O"] | {"stops": {"min": -4.0, "restitution": 0.5}}}),
     pendulum("loose", joints={"O": PIN["O"] | {"play": 0.01, "radius": 0.01}}),
-    pair("loose-gears", {"G": joint(at("A"), at("B"), "gear", ratio=-2, backlash=0.01)}),
+    pair(
+        "loose-gears",
+        {"E": joint(at("ground", [1.0, 0.0]), at("B")), "G": joint(at("A"), at("B"), "gear", ratio=-2, backlash=0.01)},
+    ),
     pendulum("sticking", joints={"O": PIN["O"] | {"coulomb": 0.1, "stick": "exact"}}),
     scene(
         "bouncing",
