@@ -11,6 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 from shoal.errors import InputError
+from shoal.mechanics.analysis.evaluate import Evaluator
+from shoal.mechanics.analysis.modes import modes
+from shoal.mechanics.analysis.reactions import reactions
+from shoal.mechanics.analysis.statics import statics
 from shoal.mechanics.assembly.build import build
 from shoal.mechanics.simulate import simulate
 from shoal.scene import Scene
@@ -218,35 +222,45 @@ def test_a_spring_that_is_stated_as_a_signal_is_that_spring() -> None:
     assert one.points == pytest.approx(other.points, abs=1e-8)
 
 
-def test_directions_in_space() -> None:
-    """A hinge about any axis, a torque about it, a following force and a slider: as springs and dampers say it."""
-    axis, tip = [1.0, 2.0, -0.5], {"body": "arm", "point": "end"}
-    base = {
+AXIS = [1.0, 2.0, -0.5]
+POST = {
+    "kind": "spring", "first": {"body": "arm", "point": "end"}, "second": {"body": "bead"}, "length": 0.2,
+    "stiffness": 50, "damping": 2,
+}  # fmt: skip
+
+
+def in_space(**loads: Any) -> dict[str, Any]:
+    """A bead on a rod that turns about an oblique axis, with a torque about it and a force that turns with the rod."""
+    turn = {"kind": "torque", "at": {"body": "arm"}, "axis": AXIS, "torque": "8*(0.3 - angle(hinge)) - 0.5*rate(hinge)"}
+    push = {"kind": "force", "at": {"body": "arm", "point": "end"}, "force": [0, 1, 2], "follows": True}
+    return {
         "name": "space",
         "dimensions": 3,
         "gravity": [0, 0, -9.81],
         "bodies": {"arm": rod(0.8, 2.0), "bead": {"kind": "point-mass", "mass": 0.3}},
         "joints": {
-            "hinge": {"first": ground(0, 0, 0), "second": {"body": "arm"}, "axis": axis},
+            "hinge": {"first": ground(0, 0, 0), "second": {"body": "arm"}, "axis": AXIS},
             "rail": {"kind": "slider", "first": {"body": "arm"}, "second": {"body": "bead"}, "axis": [1, 0, 0]},
         },
-        "markers": {"tip": tip, "bead": {"body": "bead"}},
+        "loads": loads or {
+            "turn": turn,
+            "push": {**push, "scale": "distance(bead, tip) - velocity(bead, z)*slide(rail) + 0.1*slide_rate(rail)"},
+        },
+        "markers": {"tip": {"body": "arm", "point": "end"}, "bead": {"body": "bead"}},
         "initial": {"arm": {"rotation": [0.1, 0.0, 0.0]}, "bead": {"position": [0.3, 0.0, 0.0]}},
         "solver": {**FINE, "duration": 1.0, "integrator": "dop853"},
-    }
-    post = {"kind": "spring", "second": {"body": "bead"}, "first": tip, "length": 0.2, "stiffness": 50, "damping": 2}
-    springs = {
-        "turn": {
-            "kind": "torsion-spring", "first": ground(0, 0, 0), "second": {"body": "arm"}, "axis": axis,
-            "stiffness": 8, "damping": 0.5, "angle": 0.3,
-        },
-        "post": post,
     }  # fmt: skip
-    torque = "8*(0.3 - angle(hinge)) - 0.5*rate(hinge)"
-    turn = {"kind": "torque", "at": {"body": "arm"}, "axis": axis, "torque": torque}
-    signals = {"turn": turn, "post": post}
+
+
+def test_a_hinge_in_space_with_a_motor_is_one_with_a_spring_and_a_damper() -> None:
+    spring = {
+        "kind": "torsion-spring", "first": ground(0, 0, 0), "second": {"body": "arm"}, "axis": AXIS,
+        "stiffness": 8, "damping": 0.5, "angle": 0.3,
+    }  # fmt: skip
     times = np.linspace(0.0, 1.0, 5)
-    one, other = (simulate(Scene.parse({**base, "loads": each}), times) for each in (springs, signals))
+    one, other = (
+        simulate(Scene.parse(in_space(turn=each, post=POST)), times) for each in (in_space()["loads"]["turn"], spring)
+    )
     assert one.points == pytest.approx(other.points, abs=1e-9)
 
 
@@ -311,11 +325,56 @@ def test_names_of_parts_may_hold_hyphens() -> None:
     assert Scene.parse(data).value("loads.motor.torque").expression == 'angle("left-hinge") - rate(left-hinge)'
 
 
-def test_what_knows_no_signals_says_so() -> None:
-    from shoal.mechanics.analysis.statics import statics
+def test_a_regulated_machine_rests_and_has_the_poles_of_its_design() -> None:
+    """The force on the cart depends on the pole's angle: the stiffness is not symmetric. Poles of A - B K by scipy."""
+    data = cart_pole()
+    scene = Scene.parse(data)
+    assert statics(scene).ok
+    found = {complex(one.eigenvalue) for one in modes(scene).modes}
+    poles = [-10.228790759344744, -3.660592544780669, -2.016472871746828 + 1.4737089005978206j]
+    assert sorted(found, key=abs) == pytest.approx(sorted(poles, key=abs), rel=1e-9)
+    data["loads"] = {}
+    assert not statics(Scene.parse(data), leave_unstable=False).ok
 
+
+def test_rest_under_feedback_is_that_of_the_balance_and_where_the_motion_ends() -> None:
+    scene = Scene.parse(pendulum())
+    rest = statics(scene)
+    assert rest.angles[0] + math.pi / 2 == pytest.approx(0.8977259964356257, abs=1e-9)
+    started = Scene.parse({**pendulum(), "initial": {"from": "statics", "arm": {"angle": 0.0}}})
+    still = simulate(started, np.array([1.0]))
+    assert still.points[0, 0, :, 0] == pytest.approx(rest.points[0], abs=1e-9)
+
+
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_derivatives_of_loads_that_follow_signals(dimensions: int) -> None:
+    """Stiffness and damping are minus the differences of forces, of all kinds of loads and measures."""
+    data = in_space() if dimensions == 3 else two_link()
+    if dimensions == 2:
+        tip = {"body": "fore", "point": "end"}
+        data["loads"]["along"] = {
+            "kind": "force", "at": tip, "force": [2, 1], "follows": True,
+            "scale": "sin(u1) + distance(hand, elbow)**2 + distance_rate(hand, ground) + position(hand, y)",
+        }  # fmt: skip
+    model = build(Scene.parse(data), horizon=1.0)
+    evaluator = Evaluator(model, signals=True)
+    rng, n = np.random.default_rng(3), model.unknowns
+    q = model.q0[:, 0] + 0.05 * rng.standard_normal(n)
+    none, h = np.zeros(n), 1e-6
+    stiffness = np.stack(
+        [(evaluator.force(q - x, none) - evaluator.force(q + x, none)) / (2 * h) for x in h * np.eye(n)], 1
+    )
+    damping = np.stack([(evaluator.force(q, -x) - evaluator.force(q, x)) / (2 * h) for x in h * np.eye(n)], 1)
+    for found, exact in ((evaluator.stiffness(q), stiffness), (evaluator.damping(q), damping)):
+        assert found.toarray() == pytest.approx(exact, abs=1e-6 * np.max(np.abs(exact)))
+    assert np.max(np.abs(stiffness - stiffness.T)) > 1e-3 * np.max(np.abs(stiffness))
+
+
+def test_what_knows_no_signals_says_so() -> None:
     scene = Scene.parse(pendulum())
     with pytest.raises(InputError, match=r"loads.motor.torque: follows signals"):
-        statics(scene)
+        reactions(scene)
+    with pytest.raises(InputError, match=r"loads.motor.torque: steady motions take no signals"):
+        modes(scene.with_values({"initial.arm.rate": 1.0}))
     with pytest.raises(InputError, match=r"solver.integrator: radau5 knows no signals, as of loads.motor.torque"):
         simulate(scene.with_values({"solver.integrator": "radau5"}), np.array([0.1]))

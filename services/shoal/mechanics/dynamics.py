@@ -87,7 +87,7 @@ def work_space(tile: Tile, m: Arrays) -> Work:
         least.work_space(width, m),
         rubbing.room(width, m.rows, m.rubbing.size),
         gaps.room(width, m.gaps, m.unknowns, m.rows, m.constraints.size),
-        signals.room(m.followed, width),
+        signals.room(m.followed, width, m.force_rows),
     )
 
 

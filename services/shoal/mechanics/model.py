@@ -328,11 +328,11 @@ class Model:
             REFINEMENTS if self.flat else 0,
             self._alike,
             pack(self.weight, lanes, tile),
-            *(*own, lay(elements), _laid(followed), elements, followed),
+            *(*own, lay(elements), laid(followed), elements, followed),
         )
 
 
-def _laid(structure: Any) -> Array:
+def laid(structure: Any) -> Array:
     """Write a structure as kernels read it; nothing for none. Its arrays must outlive the use."""
     if not structure:
         return np.zeros(0)

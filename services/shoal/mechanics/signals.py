@@ -2,6 +2,7 @@
 
     evaluate ─ measures, places, functions of time ─ tape.run
     act      ─ every load with the value of its register as its strength
+    linearise ─ tape.reverse ─ derivatives of the strengths by coordinates and rates
 
 Registers hold the value and the rate of every measure, positions, velocities, functions of time, constants, and the
 results of the tape, in this order.
@@ -17,14 +18,18 @@ from numba import njit, typeof, types
 from shoal.compile import function_pointers
 from shoal.compile.pointers import raw_type, shift
 from shoal.compile.structures import Reference
-from shoal.compile.vector import add_product, copy
+from shoal.compile.vector import add, add_product, copy
 from shoal.mechanics import applied, forces, functions, tape
 from shoal.mechanics.applied import Applied
+from shoal.mechanics.derived import fold
 from shoal.mechanics.forces import Forces
 from shoal.mechanics.numerics.tile import Array, Index, Tile
 
-ACT, REMEMBER = range(2)
-"""What the kernel does: evaluate all and add the loads to the forces, or count the turns of angles."""
+ACT, REMEMBER, LINEARISE = range(3)
+"""What the kernel does: evaluate all and add the loads to the forces, count the turns of angles, or see `linearise`."""
+FORCE, BY_PLACE, BY_RATE = range(3)
+"""What `linearise` makes of every strength."""
+BLOCKS = 3
 
 
 class Signals(NamedTuple):
@@ -32,8 +37,8 @@ class Signals(NamedTuple):
 
     measures: without any law. positions, velocities: rows of the state, and how many. functions: of time, by number.
     constant: (constants, lanes). code: of the tape, `size` instructions, whose results are the registers from `first`
-    on. applied, torques: loads, in whose lists of functions registers stand; torques of the plane act along their
-    measure.
+    on. strength: registers that loads follow, and how many. applied, torques: loads, in whose lists of functions
+    registers stand; torques of the plane act along their measure, times the amplitude of its law.
     """
 
     measures: Forces
@@ -48,6 +53,8 @@ class Signals(NamedTuple):
     code: Index
     size: int
     first: int
+    strength: Index
+    strengths: int
     applied: Applied
     torques: Forces
 
@@ -57,9 +64,24 @@ def registers(signals: Signals) -> int:
     return signals.first + signals.size
 
 
-def room(signals: Any, width: int) -> Array:
-    """Return the room of the signals of a tile: the continuous angles of measures, then the registers."""
-    return np.zeros((signals.measures.size + registers(signals)) * width if signals else 0)
+def room(signals: Any, width: int, rows: int) -> Array:
+    """Return the room of the signals of a tile.
+
+    The continuous angles of measures, the registers, their adjoints, one row of power, and the blocks of `linearise`.
+    """
+    if not signals:
+        return np.zeros(0)
+    return np.zeros((signals.measures.size + 2 * registers(signals) + 1 + BLOCKS * rows * signals.strengths) * width)
+
+
+def register(signals: Signals, own: Array) -> Array:
+    """Return the registers in the room of one lane, (registers,)."""
+    return own[signals.measures.size :][: registers(signals)]
+
+
+def feedback(signals: Signals, own: Array, rows: int) -> Array:
+    """Return what `linearise` left in the room of one lane, (strengths, BLOCKS, rows)."""
+    return own[signals.measures.size + 2 * registers(signals) + 1 :].reshape(signals.strengths, BLOCKS, rows)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -95,29 +117,69 @@ def evaluate(tile: Tile, s: Signals, m: Any, w: Any, t: float, z: Array, zdot: A
 
 
 @njit(cache=True, error_model="numpy")
-def act(tile: Tile, s: Signals, w: Any, z: Array, zdot: Array, f: Array) -> None:
-    """Add the loads to f (rows, lanes), and take the power [W] they supply from w.power. Uses w.element."""
-    width, register = len(tile), _registers(tile, s, w.signals)
-    applied.add_forces(tile, s.applied, register, z, zdot, f, w.power)
-    value = forces.value_row(s.torques)
+def act(tile: Tile, s: Signals, register: Array, z: Array, zdot: Array, f: Array, power: Array, room: Array) -> None:
+    """Add the loads to f (rows, lanes), and take the power [W] they supply from power (lanes,); room: w.element."""
+    width, value, rows = len(tile), forces.value_row(s.torques), forces.side(s.torques)
+    applied.add_forces(tile, s.applied, register, z, zdot, f, power)
     for k in range(s.torques.size):
-        forces.gradient(tile, s.torques, k, z, w.element)
-        forces.slip(tile, s.torques, k, zdot, w.element)
-        copy(tile, w.element, value, register, s.torques.drive[k])
+        forces.gradient(tile, s.torques, k, z, room)
+        forces.slip(tile, s.torques, k, zdot, room)
+        amplitude, strength = (forces.LAW * k + forces.AMPLITUDE) * width, s.torques.drive[k] * width
         for lane in range(width):
-            w.power[lane] -= w.element[value * width + lane] * w.element[(value + 1) * width + lane]
-        rows = forces.side(s.torques)
+            torque = s.torques.law[amplitude + lane] * register[strength + lane]
+            room[value * width + lane] = torque
+            power[lane] -= torque * room[(value + 1) * width + lane]
         for row in range(rows):
-            add_product(tile, f, s.torques.rows[rows * k + row], w.element, value, w.element, rows + row)
+            add_product(tile, f, s.torques.rows[rows * k + row], room, value, room, rows + row)
+
+
+@njit(cache=True, error_model="numpy")
+def linearise(tile: Tile, s: Signals, m: Any, w: Any, z: Array, zdot: Array) -> None:
+    """Find of every strength S, evaluated before, the force on the unknowns if it is 1, dS/dq and dS/dv.
+
+    What a rate changes with the coordinates, v'd2g/dq2, is left out, as of dampers; at rest it is zero. Uses w.element.
+    """
+    width, count, end = len(tile), s.first + s.size, m.force_rows * len(tile)
+    register = _registers(tile, s, w.signals)
+    adjoint, power = shift(register, count * width), shift(register, 2 * count * width)
+    value, rows = forces.value_row(s.measures), forces.side(s.measures)
+    for k in range(s.strengths):
+        force = shift(register, (2 * count + 1) * width + BLOCKS * k * end)
+        by_place, by_rate = shift(force, end), shift(force, 2 * end)
+        for i in range(BLOCKS * end):
+            force[i] = 0.0
+        for i in range(count * width):
+            adjoint[i] = 1.0 if i // width == s.strength[k] else 0.0
+        act(tile, s, adjoint, z, zdot, force, power, w.element)
+        tape.reverse(tile, s.code, s.size, s.first, register, adjoint)
+        for number in range(s.measures.size):
+            forces.gradient(tile, s.measures, number, z, w.element)
+            copy(tile, w.element, value, adjoint, 2 * number)
+            copy(tile, w.element, value + 1, adjoint, 2 * number + 1)
+            for row in range(rows):
+                place = s.measures.rows[rows * number + row]
+                add_product(tile, by_place, place, w.element, value, w.element, rows + row)
+                add_product(tile, by_rate, place, w.element, value + 1, w.element, rows + row)
+        at = 2 * s.measures.size
+        for number in range(s.positions):
+            add(tile, by_place, s.position[number], adjoint, at + number)
+        at += s.positions
+        for number in range(s.velocities):
+            add(tile, by_rate, s.velocity[number], adjoint, at + number)
+        for part in range(BLOCKS):
+            fold(tile, m.derived, shift(force, part * end), m.force_rows)
 
 
 @njit(cache=True, error_model="numpy")
 def _signals(tile, s, m, w, t, z, zdot, f, part):  # type: ignore[no-untyped-def]
     if part == REMEMBER:
         forces.remember(tile, s.measures, z, w.signals)
+        return
+    evaluate(tile, s, m, w, t, z, zdot)
+    if part == LINEARISE:
+        linearise(tile, s, m, w, z, zdot)
     else:
-        evaluate(tile, s, m, w, t, z, zdot)
-        act(tile, s, w, z, zdot, f)
+        act(tile, s, _registers(tile, s, w.signals), z, zdot, f, w.power, w.element)
 
 
 def kernel(tile: Tile, signals: Signals, m: Any, w: Any) -> tuple[Any, tuple[Any, ...]]:

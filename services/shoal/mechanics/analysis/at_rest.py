@@ -35,7 +35,8 @@ def begun(model: Model, scenes: Sequence[Scene] | None = None) -> Model:
     markers = np.stack([one.angles for one in found], axis=1)
     gaps = np.stack([one.gap_angles for one in found], axis=1)
     model = replace(model, q0=places, v0=np.zeros_like(places), shared_tiles={})
-    return replace(model, start_angles=angles, marker_angles=markers, gap_angles=gaps)
+    turned = np.stack([one.signal_angles for one in found], axis=1)
+    return replace(model, start_angles=angles, marker_angles=markers, gap_angles=gaps, signal_angles=turned)
 
 
 def at_start(scene: Scene, *, horizon: float = 0.0) -> Evaluator:
@@ -43,7 +44,7 @@ def at_start(scene: Scene, *, horizon: float = 0.0) -> Evaluator:
 
     Raises InputError if the scene cannot be modelled, or its start as `begun` does.
     """
-    return Evaluator(begun(Machine.of(scene).model(horizon)), one_sided=True)
+    return Evaluator(begun(Machine.of(scene).model(horizon)), one_sided=True, signals=True)
 
 
 def _equilibrium(scene: Scene) -> Equilibrium:

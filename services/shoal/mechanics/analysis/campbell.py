@@ -125,6 +125,8 @@ def campbell(
     evaluator, placement = as_stated(scene), Machine.of(scene).placement
     if evaluator.model.gaps.size:
         raise InputError(f"{evaluator.model.gap_fields[0]}: steady motions take no one-sided constraints")
+    if evaluator.model.signals:
+        raise InputError(f"{evaluator.model.signal_fields[0]}: steady motions take no signals yet")
     q, v = (part[:, 0].copy() for part in (evaluator.model.q0, evaluator.model.v0))
     if any(speeds):
         if np.max(np.abs(v), initial=0.0) <= left_out.STILL:

@@ -50,7 +50,8 @@ class Roots(NamedTuple):
 
 def small(balance: Balance, q: Array, view: View, count: int = AT_MOST) -> Roots:
     """The roots of small motions about a state q at rest, seen as `view`; count: of those that matter."""
-    stiffness, friction, follows = balance.at_rest(q, view), balance.evaluator.damping(q), balance.evaluator.follows
+    evaluator = balance.evaluator
+    stiffness, friction, follows = balance.at_rest(q, view), evaluator.damping(q, t=balance.t), evaluator.follows
     symmetric = stiffness._replace(matrix=(stiffness.matrix + stiffness.matrix.T) / 2) if follows else stiffness
     if not follows and not np.any(friction.data):
         return undamped(balance.spectrum_of(symmetric, view, count))

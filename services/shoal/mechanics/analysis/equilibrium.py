@@ -32,7 +32,8 @@ class Equilibrium(Concluded):
     stable, but where forces follow the motion; levels: below these each is zero to working accuracy. steps: load steps.
     contacts: the one-sided constraints that are closed, by name, and the forces with which they press [N or N m].
     reactions: in joints and contacts, None where the forces do not balance or where not asked for.
-    turns: angles [rad] that force elements have counted, by joint or load; gap_angles: those of contacts, (gaps,).
+    turns: angles [rad] that force elements have counted, by joint or load; gap_angles: those of contacts, (gaps,),
+    signal_angles: and of signals, (measures,).
     estimates: errors of the markers [m] by source, of the mesh and of the theory of slender rods, None where one is not
     known; None where none were looked for.
     """
@@ -59,6 +60,7 @@ class Equilibrium(Concluded):
     reactions: Reactions | None = field(repr=False)
     turns: Mapping[str, Sequence[float]] = field(repr=False)
     gap_angles: Array = field(repr=False)
+    signal_angles: Array = field(repr=False)
     estimates: Mapping[str, float | None] | None = None
 
     @property

@@ -15,16 +15,17 @@ import scipy.sparse
 
 from shoal.compile import structures
 from shoal.errors import InputError
-from shoal.mechanics import forces, functions, plane
+from shoal.mechanics import forces, functions, plane, signals
 from shoal.mechanics.analysis import evaluations
 from shoal.mechanics.analysis.load_stiffness import driven, in_plane, in_space, of_drives
+from shoal.mechanics.applied import Applied
 from shoal.mechanics.dynamics import derived_rows, work_space
 from shoal.mechanics.elements.families import KERNELS, lay
 from shoal.mechanics.functions import Functions
 from shoal.mechanics.gaps import Gaps, enter
 from shoal.mechanics.kernels import ready
 from shoal.mechanics.machine import Machine
-from shoal.mechanics.model import Arrays, Model
+from shoal.mechanics.model import Arrays, Model, laid
 from shoal.mechanics.numerics import sparse
 from shoal.mechanics.numerics.tile import SINGLE, Array, Index
 from shoal.mechanics.tangent import Tangent, damping_at, stiffness_at, tangent_tile
@@ -80,19 +81,20 @@ class Evaluator:
     """Evaluates a model at any state; not for threads, as it keeps the turns that angle forces counted.
 
     lane: of the model; forces and accelerations are available in any lane, all else in the first. one_sided: whether
-    the caller sees to contacts, which are open unless their state is put in (`contacts`). Raises InputError else.
+    the caller sees to contacts, which are open unless their state is put in (`contacts`); signals: whether the caller
+    takes loads that follow these. Raises InputError else.
     """
 
-    def __init__(self, model: Model, lane: int = 0, *, one_sided: bool = False) -> None:
+    def __init__(self, model: Model, lane: int = 0, *, one_sided: bool = False, signals: bool = False) -> None:
         if model.gaps.size and not one_sided:
             raise InputError(
                 f"{model.gap_fields[0]}: motions, reactions, sensors, equilibria and modes take one-sided constraints, "
                 "but not yet steady motions and starts from the end of a run"
             )
-        if model.signals:
+        if model.signals and not signals:
             raise InputError(
-                f"{model.signal_fields[0]}: follows signals, which runs know, but not yet equilibria, modes, "
-                "reactions, virtual sensors and steady motions"
+                f"{model.signal_fields[0]}: follows signals, which motions, equilibria and modes know, but not yet "
+                "reactions, virtual sensors, steady motions and starts from the end of a run"
             )
         self.model, self._strikes = model, False
         self._arrays = model.tile(SINGLE, slice(lane, lane + 1))
@@ -103,6 +105,10 @@ class Evaluator:
         derived_rows(SINGLE, self._arrays, self._room)
         start = model.start_angles[:, lane % model.start_angles.shape[1]]
         self._room.memory[:] = forces.initial_memory(SINGLE, self._arrays.forces, self._room.z, start)
+        if followed := self._arrays.followed:
+            begun = model.signal_angles[:, lane % model.signal_angles.shape[1]]
+            turned = forces.initial_memory(SINGLE, followed.measures, self._room.z, begun)
+            self._room.signals[: turned.size] = turned
 
     @cached_property
     def _tangent(self) -> Tangent:
@@ -147,12 +153,19 @@ class Evaluator:
 
     @property
     def turns(self) -> Array:
-        """The continuous angles [rad] that angle forces have counted, (forces,); may be set."""
-        return self._room.memory.copy()
+        """The continuous angles [rad] that angle forces and then signals have counted; may be set."""
+        return np.concatenate([self._room.memory, self.signal_turns])
 
     @turns.setter
     def turns(self, angles: Array) -> None:
-        self._room.memory[:] = angles
+        self._room.memory[:] = angles[: len(self._room.memory)]
+        self.signal_turns[:] = angles[len(self._room.memory) :]
+
+    @property
+    def signal_turns(self) -> Array:
+        """The continuous angles [rad] of the measures of signals, as they are kept, (measures,)."""
+        followed = self._arrays.followed
+        return self._room.signals[: followed.measures.size if followed else 0]
 
     def put_contacts(self, kept: Array) -> None:
         """Let contacts be open, stick or slip as they did at a sample, (contacts, KEPT), see `gaps.keep`."""
@@ -254,17 +267,35 @@ class Evaluator:
         if multipliers is not None:
             tangent = self._tangent
             np.add.at(values, tangent.curvature, tangent.bend * multipliers[tangent.owner])
-        return scipy.sparse.csc_array(sparse.matrix(self._tangent.pattern, values) + self._load_stiffness(arrays, t))
+        found = sparse.matrix(self._tangent.pattern, values) + self._load_stiffness(arrays, t)
+        return scipy.sparse.csc_array(found + self._feedback(arrays, t, signals.BY_PLACE))
 
-    def damping(self, q: Array, v: Array | None = None, *, dry: bool = False) -> scipy.sparse.csc_array:
-        """-dQ/dv, (unknowns, unknowns); dry: with the slope of smoothed dry friction, which is huge at rest."""
+    def damping(self, q: Array, v: Array | None = None, t: float = 0.0, *, dry: bool = False) -> scipy.sparse.csc_array:
+        """-dQ/dv, (unknowns, unknowns); dry: with the slope of smoothed dry friction, which is huge at rest.
+
+        Signals make it unsymmetric.
+        """
         self._enter(q, v)
         arrays = self._arrays
         if not dry:
             law = arrays.forces.law.copy()
             law[forces.COULOMB :: forces.LAW] = 0.0
             arrays = self._changed(forces=arrays.forces._replace(law=law))
-        return sparse.matrix(self._tangent.pattern, damping_at(SINGLE, arrays, self._tangent, self._room))
+        found = sparse.matrix(self._tangent.pattern, damping_at(SINGLE, arrays, self._tangent, self._room))
+        if not arrays.followed:
+            return found
+        return scipy.sparse.csc_array(found + self._feedback(arrays, t, signals.BY_RATE))
+
+    def _feedback(self, arrays: Arrays, t: float, by: int) -> scipy.sparse.csc_array:
+        """-dQ/dq or -dQ/dv by the signals that loads follow, at the state that was entered."""
+        n = self.model.unknowns
+        if not arrays.followed:
+            return scipy.sparse.csc_array((n, n))
+        evaluations.linearise(SINGLE, arrays, self._room, t)
+        blocks = signals.feedback(arrays.followed, self._room.signals, self.model.force_rows)
+        return scipy.sparse.csc_array(
+            -scipy.sparse.csc_array(blocks[:, signals.FORCE, :n].T) @ scipy.sparse.csr_array(blocks[:, by, :n])
+        )
 
     def strain_energies(self, q: Array) -> dict[str, float]:
         """Strain energy [J] of every flexible body."""
@@ -278,9 +309,12 @@ class Evaluator:
 
     @property
     def follows(self) -> bool:
-        """Return whether a load turns with a body, or a torque in space does not, so that there is no potential."""
+        """Return whether a load turns with a body, or a torque in space does not, or a load follows signals.
+
+        Then there is no potential.
+        """
         applied = self._arrays.applied
-        return applied.following + applied.turning + applied.twisting > 0
+        return bool(self._arrays.followed) or applied.following + applied.turning + applied.twisting > 0
 
     def _enter(self, q: Array, v: Array | None) -> None:
         n = self.model.unknowns
@@ -296,13 +330,10 @@ class Evaluator:
             return arrays
         law = arrays.forces.law.copy()
         law[forces.AMPLITUDE :: forces.LAW] *= load
-        applied = arrays.applied
         return self._changed(
             weight=arrays.weight * load,
             forces=arrays.forces._replace(law=law),
-            applied=applied._replace(
-                coefficient=applied.coefficient * load, factor=applied.factor * load, share=applied.share * load
-            ),
+            **_scaled(arrays, load),
         )
 
     def _only(self, body: str, number: int | None = None) -> Arrays:
@@ -319,13 +350,12 @@ class Evaluator:
         law = np.zeros_like(arrays.forces.law)
         law[forces.SPEED :: forces.LAW] = 1.0
         none = np.full_like(arrays.forces.table, -1)
-        applied = arrays.applied
         return self._changed(
             weight=0.0 * arrays.weight,
             families=lay(tuple(elements)),
             elements=tuple(elements),
             forces=arrays.forces._replace(law=law, table=none, energy=none),
-            applied=applied._replace(coefficient=0.0 * applied.coefficient, factor=0.0 * applied.factor, share=0.0),
+            **_scaled(arrays, 0.0),
         )
 
     def _changed(self, **parts: Any) -> Arrays:
@@ -377,6 +407,15 @@ class Evaluator:
 
         following = in_plane if self.model.dimensions == plane.DIMENSIONS else in_space
         parts = [*following(arrays, z, strengths), *of_drives(arrays, z, self._drives(arrays, t))]
+        if followed := arrays.followed:
+            evaluations.linearise(SINGLE, arrays, self._room, t)
+            register = signals.register(followed, self._room.signals)
+            acting = arrays._replace(applied=followed.applied, forces=followed.torques)
+            torques = register[followed.torques.drive] * followed.torques.law[forces.AMPLITUDE :: forces.LAW]
+            parts += [
+                *following(acting, z, lambda numbers: register[numbers]),
+                *of_drives(acting, z, list(enumerate(torques.tolist()))),
+            ]
         if not parts:
             return scipy.sparse.csc_array((n, n))
         row = np.concatenate([np.repeat(to, len(source)) for to, source, _ in parts])
@@ -385,6 +424,23 @@ class Evaluator:
         size = self.model.rows
         block = scipy.sparse.csr_array((value, (row, column)), shape=(size, size))
         return scipy.sparse.csc_array(self.expansion.T @ block @ self.expansion)
+
+
+def _scaled(arrays: Arrays, load: float) -> dict[str, Any]:
+    """Return the parts of the arrays in which applied loads are scaled, also those that follow signals."""
+    applied, followed = arrays.applied, arrays.followed
+    found: dict[str, Any] = {"applied": _scaled_loads(applied, load)}
+    if followed:
+        torques = followed.torques._replace(law=followed.torques.law * load)
+        followed = followed._replace(applied=_scaled_loads(followed.applied, load), torques=torques)
+        found |= {"followed": followed, "signals": laid(followed)}
+    return found
+
+
+def _scaled_loads(applied: Applied, load: float) -> Applied:
+    return applied._replace(
+        coefficient=applied.coefficient * load, factor=applied.factor * load, share=applied.share * load
+    )
 
 
 def _expansion(model: Model) -> Sparse:

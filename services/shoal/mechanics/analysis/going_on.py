@@ -59,7 +59,7 @@ def as_stated(scene: Scene, *, horizon: float = 0.0) -> Evaluator:
     model = Machine.of(scene).model(horizon)
     if isinstance(scene.initial_from, End):
         model = taken_up(model, scene.initial_from)
-    return Evaluator(model, one_sided=True)
+    return Evaluator(model, one_sided=True, signals=True)
 
 
 def _finer(state: End, scene: Scene) -> End:

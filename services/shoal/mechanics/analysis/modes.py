@@ -288,9 +288,11 @@ def _but_for_gravity(scene: Scene, about: str) -> list[str]:
 
 
 def _refuse_contacts(evaluator: Evaluator) -> None:
-    """Raises InputError for machines with one-sided constraints, of which steady motions know nothing."""
+    """Raises InputError for machines with one-sided constraints or signals, of which steady motions know nothing."""
     if evaluator.model.gaps.size:
         raise InputError(f"{evaluator.model.gap_fields[0]}: steady motions take no one-sided constraints")
+    if evaluator.model.signals:
+        raise InputError(f"{evaluator.model.signal_fields[0]}: steady motions take no signals yet")
 
 
 def is_moving(evaluator: Evaluator, time: float) -> bool:

@@ -41,6 +41,7 @@ from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
 from shoal.scene import Attachment, Scene
 from shoal.scene.loads import Torque
+from shoal.scene.signals import following
 
 TURN = 0.8
 """Largest turn [rad] of any body or section in one load step."""
@@ -207,11 +208,12 @@ class _Search:
         complex_pair = np.any(np.abs(np.imag(eigenvalues)) > 1e-9 * np.abs(eigenvalues) + levels)
         if growth is None and complex_pair:
             return [kinds.GROWS.found("forces that follow the motion make it flutter")]
-        if len(eigenvalues) and np.real(eigenvalues[0]) < -levels[0]:
+        if growth is None and len(eigenvalues) and np.real(eigenvalues[0]) < -levels[0]:
             rate = float(np.sqrt(-np.real(eigenvalues[0])))
             text = f"unstable: it leaves with exp(t * {rate:.4g}/s); moves first: {self._movers(lowest)}"
             return [*met, kinds.UNSTABLE.found(text, rate=rate)]
-        loose = np.real(eigenvalues) <= levels
+        # What is damped and does not grow may have negative eigenvalues of an unsymmetric stiffness, in pairs.
+        loose = (np.real(eigenvalues) if growth is None else np.abs(eigenvalues)) <= levels
         if np.any(loose) and hides(levels[loose], eigenvalues, pull(self.scene)):
             least = float(np.sqrt(np.max(levels[loose])))
             text = f"round-off hides whether {self._movers(lowest)} is held, by less than {least:.1g} rad/s"
@@ -254,12 +256,13 @@ class _Search:
         eigenvalues, levels, _ = self._eigen(q)
         is_pressed = any(self.pressing.values())
         pressed = self.balance.pressed(q) if is_pressed else None
+        known = balanced and not self.evaluator.model.signals
         react = (
-            cache(lambda: reactions_of(self.evaluator, q, rest, rest, self.time, pressing=pressed))
-            if balanced
-            else None
+            cache(lambda: reactions_of(self.evaluator, q, rest, rest, self.time, pressing=pressed)) if known else None
         )
         neglected = [left_out.friction(self.scene, react), left_out.driven(self.evaluator, q, self.time)]
+        if fields := self.evaluator.model.signal_fields if self.reactions else ():
+            neglected.append(f"reactions of joints are left out where loads follow signals ({', '.join(fields)})")
         rubbing = (name for name, one in self.scene.contacts.items() if one.rubs)
         if rough := [name for name in rubbing if f"contacts.{name}" in self.pressing]:
             neglected.append(f"friction is left out ({', '.join(rough)}): the surfaces may stick at other places, too")
@@ -286,6 +289,7 @@ class _Search:
             reactions=react() if react is not None and self.reactions else None,
             turns=named_turns(self.evaluator.model, self.evaluator.turns),
             gap_angles=self.balance.contacts.angles,
+            signal_angles=self.evaluator.signal_turns.copy(),
         )
 
     def _assembled(self) -> Array:
@@ -379,7 +383,7 @@ class _Search:
 
     def _growth(self, q: Array, view: View) -> float | None:
         """The largest real part [1/s] of small motions with the damping of the machine; None where it has none."""
-        if not np.any(self.evaluator.damping(q).data):
+        if not np.any(self.evaluator.damping(q, t=self.time).data):
             return None
         return float(np.max(small(self.balance, q, view).values.real, initial=0.0))
 
@@ -402,6 +406,7 @@ class _Search:
         """The loads that can turn a body without end."""
         loads = self.scene.loads.items()
         names = [name for name, load in loads if isinstance(load, Torque) or getattr(load, "follows", False)]
+        names += [name for name in following(self.scene) if name.split(".")[1] not in names]
         return ", ".join(names) or "its loads"
 
     def _movers(self, displacement: Array) -> str:

@@ -62,7 +62,7 @@ class SignalLoads:
 
     def turn(self, name: str, first: Attachment, second: Attachment, strength: int) -> None:
         """Let a torque of the plane follow a strength."""
-        self._torques._angle(name, first, second, _NO_LAW, Z)
+        self._torques._angle(name, first, second, ElementForceLaw(amplitude=1.0), Z)
         self._turning.append(strength)
 
     def signals(self, applied: Callable[[Callable[[int], int]], Applied]) -> Signals | tuple[()]:
@@ -97,6 +97,8 @@ class SignalLoads:
             index([one + [0] * (tape.ENTRIES - len(one)) for one in code]).ravel(),
             len(code),
             base["result"],
+            index(strengths),
+            len(strengths),
             applied(lambda strength: strengths[strength]),
             turned,
         )
