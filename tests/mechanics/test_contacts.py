@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from shoal.errors import InputError
 from shoal.mechanics.simulate import simulate
 from shoal.scene import Scene, load_scene
-from shoal.trajectory import Trajectory
+from shoal.trajectory import Array, Trajectory
 
 pytestmark = pytest.mark.compiles("kernels of contacts, which few machines need")
 FLOOR = {"body": "ground", "line": 0.0}
@@ -269,6 +269,74 @@ def test_a_step_too_long_for_a_rod_with_contacts_names_no_integrator_that_knows_
     floor = {"floor": {"first": {"body": "B", "point": "end"}, "second": FLOOR}}
     with pytest.raises(InputError, match=r"beyond the stability limit .* use a smaller step$"):
         run(machine(rod, floor, {"position": [0.0, 0.5]}, 1.0))
+
+
+@pytest.mark.parametrize("wall", [-1.2, -0.7, -0.3, 0.02, 0.17])
+def test_a_pinned_rod_leaves_a_rough_wall_at_its_restitution(wall: float) -> None:
+    """Its joint leaves one rate: if the tip may not stick and leave at once, it slips on."""
+    contact = {"first": {"body": "B", "point": [0.25, 0.0]}, "restitution": 0.6, "mu": 0.2,
+               "second": {"body": "ground", "point": [0.5, 0.0], "line": wall}}  # fmt: skip
+    scene = machine({"kind": "rigid-body", "mass": 2.0, "inertia": 0.1}, {"wall": contact}, {
+        "position": [0.25 * np.cos(0.2), 0.25 * np.sin(0.2)], "angle": 0.2, "rate": -1.0,
+        "velocity": [0.25 * np.sin(0.2), -0.25 * np.cos(0.2)],
+    }, 0.3, gravity=[0.0, 0.0], joints={"pin": {"kind": "revolute", "first": {"body": "ground", "point": [0.0, 0.0]},
+                                                "second": {"body": "B", "point": [-0.25, 0.0]}}})  # fmt: skip
+    found = run(scene)
+    (impact,) = events(found, "impact")
+    assert found.angles[-1, 0, 0] == pytest.approx(0.2 - impact + 0.6 * (0.3 - impact), abs=1e-12)
+
+
+def test_friction_in_a_hole_turns_with_the_surface() -> None:
+    """A disc that slides around a hole, until it has gone half around; Newton and Euler by SciPy."""
+    mass, inertia, radius, hole, mu = 1.0, 2e-3, 0.1, 0.5, 0.05
+    way, length = 6.0 / (hole - radius), 0.3
+
+    def slides(_: float, y: Array) -> Array:
+        angle, rate, spin = y
+        normal = mass * (rate**2 * (hole - radius) + G * np.cos(angle))
+        slip = rate * (hole - radius) + spin * radius  # of the disc's point at the wall, along the way
+        friction = -mu * normal * np.sign(slip)
+        return np.array([rate, friction / mass / (hole - radius) - G * np.sin(angle) / (hole - radius),
+                         friction * radius / inertia])  # fmt: skip
+
+    true: Any = solve_ivp(slides, (0.0, length), [0.0, way, 30.0], "DOP853", rtol=1e-12, atol=1e-12)
+    wall = {"first": {"body": "B", "radius": radius}, "mu": mu,
+            "second": {"body": "ground", "point": [0.0, 0.0], "hole": hole}}  # fmt: skip
+    scene = machine({"kind": "rigid-body", "mass": mass, "inertia": inertia}, {"wall": wall}, {
+        "position": [0.0, -(hole - radius)], "velocity": [6.0, 0.0], "rate": 30.0}, length)  # fmt: skip
+    found, angle = run(scene), true.y[0, -1]
+    assert angle > 2.0
+    expected = (hole - radius) * np.array([np.sin(angle), -np.cos(angle)])
+    np.testing.assert_allclose(found.points[-1, 0, :, 0], expected, atol=1e-9)
+
+
+@pytest.mark.slow  # compiles kernels of contacts in space
+def test_friction_in_a_bowl_turns_with_the_surface() -> None:
+    """A sphere that slides in a hollow sphere; Newton and Euler by SciPy."""
+    mass, radius, hole, mu = 0.5, 0.1, 0.6, 0.05
+    inertia, far, length = 0.4 * mass * radius**2, hole - radius, 1.0
+    down = np.array([0.0, 0.0, -G])
+
+    def slides(_: float, y: Array) -> Array:
+        place, velocity, spin = y[:3], y[3:6], y[6:]
+        inward = -place / far
+        slip = velocity + np.cross(spin, -radius * inward)
+        slip -= inward * (inward @ slip)
+        normal = mass * (velocity @ velocity / far - inward @ down)
+        friction = -mu * normal * slip / np.linalg.norm(slip)
+        force = normal * inward + friction
+        return np.concatenate([velocity, force / mass + down, np.cross(-radius * inward, friction) / inertia])
+
+    start = [0.3, 0.0, -0.4], [0.0, 3.0, 0.0], [20.0, 5.0, -10.0]
+    true: Any = solve_ivp(slides, (0.0, length), np.concatenate(start), "DOP853", rtol=1e-12, atol=1e-12)
+    bowl = {"first": {"body": "B", "radius": radius}, "mu": mu,
+            "second": {"body": "ground", "point": [0.0, 0.0, 0.0], "hole": hole}}  # fmt: skip
+    body = {"kind": "rigid-body", "mass": mass, "inertia": [inertia] * 3}
+    scene = machine(body, {"bowl": bowl}, dict(zip(("position", "velocity", "spin"), start, strict=True)), length,
+                    dimensions=3, gravity=down.tolist())  # fmt: skip
+    found = run(scene, balance=1e-8)
+    assert not found.model["events"]
+    np.testing.assert_allclose(found.points[-1, 0, :, 0], true.y[:3, -1], atol=1e-8)
 
 
 def test_a_ball_in_a_circular_hole_is_a_billiard() -> None:

@@ -81,7 +81,8 @@ def undecided(deviation: Deviation) -> list[Undecided] | None:
 def _grazes(history: GapHistory, events: Sequence[Event], error: Array) -> Iterator[Undecided]:
     """Yield near misses and light touches that are within the error of a gap."""
     for gap, joint in enumerate(history.joints):
-        own = np.unique([event["time"] for event in events if place_of(event) == joint])
+        # A rest is told where impacts accumulate, which may be after the last sample.
+        own = np.unique([event["time"] for event in events if place_of(event) == joint and event["kind"] != "rests"])
         for time, margin in zip(*history.nearest(gap), strict=True):
             known = float(error[np.searchsorted(history.times, time), gap])
             if margin <= known:

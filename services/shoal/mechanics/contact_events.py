@@ -11,6 +11,8 @@ import numpy as np
 from numba import njit
 
 from shoal.mechanics import kernels
+from shoal.mechanics.contact import response
+from shoal.mechanics.contact.impact import STILL, fastest
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.gaps import DRY, HIT, LIFT, RIGID, SLIDE, SLIP, STOP
 from shoal.mechanics.integrators.scheme import Scheme, interpolate
@@ -38,6 +40,14 @@ def begin(tile: Tile, m: Arrays, w: Work) -> None:
 
 
 @njit(cache=True, error_model="numpy")
+def proceed(tile: Tile, m: Arrays, w: Work) -> None:
+    """Begin the next step where the last one has ended."""
+    shift(tile, m, w)
+    if m.gaps.tangents > 1:
+        response.turn_headings(m, w, len(tile))
+
+
+@njit(cache=True, error_model="numpy")
 def shift(tile: Tile, m: Arrays, w: Work) -> None:
     """Let what was looked at last be that at the beginning of a step."""
     width = len(tile)
@@ -45,6 +55,7 @@ def shift(tile: Tile, m: Arrays, w: Work) -> None:
     for at in range(count):
         for what in range(4):
             w.gaps.before[what * count + at] = _read(m, w, width, at, what)
+        w.gaps.dips[at] = 0.0
         # A slip that has just begun is none but for round-off.
         if w.gaps.mode[at] == SLIP:
             w.gaps.before[MARGIN * count + at] = max(w.gaps.before[MARGIN * count + at], 0.0)
@@ -104,7 +115,7 @@ def first(
     for at in range(count):
         g.hit[at] = 0.0
         if g.closed[at] != 0.0:
-            holding = holding or _pulls(m, w, width, at) or _turns(m, w, width, at)
+            holding = holding or g.dips[at] != 0.0 or _pulls(m, w, width, at) or _turns(m, w, width, at)
         else:
             reach = 2.0 * taken * max(abs(g.before[RATE * count + at]), abs(g.rate[at]))
             near = near or min(g.before[at], g.value[at]) < reach
@@ -201,15 +212,17 @@ def _root(
     width = len(tile)
     _at(tile, scheme, m, w, k, t, left, taken, tolerance, holding)
     a, b, fb = right, left, _read(m, w, width, at, what)
+    # A gap that begins at zero, but for round-off, closes where it falls below that.
+    level = m.gaps.resolution if what == VALUE and abs(fb) <= m.gaps.resolution else 0.0
     _at(tile, scheme, m, w, k, t, right, taken, tolerance, holding)
-    fa = _read(m, w, width, at, what)
+    fa, fb = _read(m, w, width, at, what) + level, fb + level
     if not fa * fb < 0.0:
         return left if left > 0.0 and fb < 0.0 else right
     part = fa / (fa - fb)
     for _ in range(ITERATIONS):
         x = a + part * (b - a)
         _at(tile, scheme, m, w, k, t, x, taken, tolerance, holding)
-        f, c, fc = _read(m, w, width, at, what), a, fa
+        f, c, fc = _read(m, w, width, at, what) + level, a, fa
         if f * fa <= 0.0:
             c, fc, b, fb = b, fb, a, fa
         a, fa = x, f
@@ -259,8 +272,9 @@ def touching(tile: Tile, m: Arrays, w: Work) -> float:
     g, found = w.gaps, 0.0
     kernels.look(tile, m, w, w.z, w.zdot)
     for at in range(m.gaps.size * len(tile)):
+        still = STILL * fastest(m, w, len(tile), at % len(tile))
         if m.gaps.kind[at // len(tile)] == DRY:
             g.hit[at], g.closed[at], found = HIT, 1.0, 1.0
-        elif g.value[at] <= TOUCHING * m.gaps.resolution and (g.rate[at] <= 0.0 or m.gaps.soft[at // len(tile)] > 0):
+        elif g.value[at] <= TOUCHING * m.gaps.resolution and (g.rate[at] <= still or m.gaps.soft[at // len(tile)] > 0):
             g.hit[at], found = HIT, 1.0
     return found

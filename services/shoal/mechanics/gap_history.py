@@ -60,7 +60,9 @@ class GapHistory:
         rise = self.value[k + 1, gap] - self.value[k, gap]
         # g(x) = g0 + a x + c x^2 + d x^3, 0 < x < 1, whose slope falls from a < 0 to b > 0 through one root.
         c, d = 3.0 * rise - 2.0 * a - b, a + b - 2.0 * rise
-        x = -a / (c + np.sqrt(np.maximum(c * c - 3.0 * a * d, 0.0)))
+        root = np.sqrt(np.maximum(c * c - 3.0 * a * d, 0.0))
+        # Each form where its terms have one sign: values that are round-off may make c negative, and d positive.
+        x = np.where(c < 0.0, (root - c) / np.where(c < 0.0, 3.0 * d, 1.0), -a / np.where(c < 0.0, 1.0, c + root))
         return self.times[k] + x * step, self.value[k, gap] + x * (a + x * (c + x * d))
 
     def before(self, gap: int, sample: int) -> tuple[float, float]:

@@ -23,6 +23,8 @@ RIGID, GIVES = 0, 1
 """Whether a contact is rigid, or gives way by a law of its force."""
 STIFFNESS, EXPONENT, DAMPING, LOSS, VISCOSITY = range(5)
 LAW_SIZE = 5
+PLANE = 2
+"""Directions of a contact with one tangent."""
 STICK, SLIP = 1.0, 2.0
 """Modes of closed contacts that rub."""
 HIT, LIFT, SLIDE, STOP = 1.0, -1.0, 2.0, 3.0
@@ -72,16 +74,18 @@ class GapWork(NamedTuple):
     [m/s]. before: value, rate, force and margin at the beginning of a step, (4 * contacts, lanes). closed: whether the
     contact is closed, unclear: whether its force was not unique at any time, in a way that moves the machine, mode:
     whether it sticks or slips; hit: what event of it a step has ended at; impulse: at the last event. force: multiplier
-    by direction, of a closed contact along the normal not negative [N or N m]; near: those of the last decision. slip,
-    bias: rate of each direction, and its derivative for accelerations of zero. heading: direction of slip in the axes
-    of the ground, (3 * contacts, lanes); axes: normal and tangents, (9 * contacts, lanes). gradient, response: of each
-    direction, and the acceleration by a unit force, (directions * unknowns, lanes). none: the acceleration without
-    forces, unit: a unit force, (rows, lanes). reaction: multipliers of the constraints: without forces, by a unit force
-    of each direction, and as they are, ((directions + 2) * constraints, lanes). matrix, load, found, way, chosen: of
-    one lane. pair: `pairs.describe`. order: of the last impact, how far the impulses of contacts that strike one after
-    the other would be from those at once, (lanes,). log: time, contact, kind, impulse and `order` of each event of the
-    first lane, (RECORD * LOGGED,); number: of events, decisions: times at which contacts were decided on, alone:
-    whether a lane of a tile of several comes near an event, which it has to meet alone, (lanes,).
+    by direction, of a closed contact along the normal not negative [N or N m]; near: those of the last decision; dips:
+    whether it, or the margin, was negative anywhere in the step. slip, bias: rate of each direction, and its derivative
+    for accelerations of zero. heading: direction of slip, of one tangent its sign along it, of two in the axes of the
+    ground as it was at the beginning of the step, (3 * contacts, lanes); axes: normal and tangents, (9 * contacts,
+    lanes). gradient, response: of each direction, and the acceleration by a unit force, (directions * unknowns, lanes).
+    none: the acceleration without forces, unit: a unit force, (rows, lanes). reaction: multipliers of the constraints:
+    without forces, by a unit force of each direction, and as they are, ((directions + 2) * constraints, lanes). matrix,
+    load, found, way, chosen: of one lane. pair: `pairs.describe`. order: of the last impact, how far the impulses of
+    contacts that strike one after the other would be from those at once, (lanes,). log: time, contact, kind, impulse
+    and `order` of each event of the first lane, (RECORD * LOGGED,); number: of events, decisions: times at which
+    contacts were decided on, alone: whether a lane of a tile of several comes near an event, which it has to meet
+    alone, (lanes,).
     """
 
     memory: Array
@@ -98,6 +102,7 @@ class GapWork(NamedTuple):
     impulse: Array
     force: Array
     near: Array
+    dips: Array
     slip: Array
     bias: Array
     heading: Array
@@ -235,6 +240,8 @@ def _look_at_pair(gaps: Gaps, contact: int, width: int, lane: int, z: Array, zdo
 def slip_along(gaps: Gaps, g: GapWork, contact: int, width: int, lane: int) -> float:
     """Return the slip rate along the direction in which a contact has slipped [m/s or rad/s]."""
     ways, total = 1 + gaps.tangents, 0.0
+    if ways == PLANE:
+        return g.slip[(contact * ways + 1) * width + lane] * g.heading[3 * contact * width + lane]  # type: ignore[no-any-return]
     for k in range(3):
         here = 0.0
         for way in range(1, ways):

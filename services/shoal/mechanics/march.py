@@ -369,7 +369,7 @@ def _advance(
         elongations(tile, m.forces, w.z, w.memory, w.element, k.elongation)
     taken, aims = float(rest), 0
     if touches:
-        events.shift(tile, m, w)
+        events.proceed(tile, m, w)
     while True:
         asked = taken
         taken = advance(tile, scheme, m, w, now, asked)

@@ -363,12 +363,29 @@ def alone(
             block[i * ways + j] = matrix[(first + i) * n + first + j]
     solve(ways, block, right, push)
     tangential = np.sqrt(np.sum(push[1:] ** 2))
-    if push[0] >= 0.0 and tangential <= limit(gaps, contact, width, lane, push[0], True):
+    within = push[0] >= 0.0 and tangential <= limit(gaps, contact, width, lane, push[0], True)
+    if within and _vanish(ways, n, first, matrix, rest, push):
         for k in range(ways):
             out[first + k] = push[k]
         return FINE
     mode[contact] = SLIP
     return _slip(gaps, contact, gaps.mu[at], push, matrix, rest, way, out)  # type: ignore[no-any-return]
+
+
+@njit(cache=True, error_model="numpy")
+def _vanish(ways: int, n: int, first: int, matrix: Array, rest: Array, push: Array) -> bool:
+    """Return whether forces of one contact take away its rates along all directions.
+
+    Joints may let no more than one of them be: a pinned rod cannot leave a wall with e > 0 and not slip.
+    """
+    for i in range(first, first + ways):
+        left, size = rest[i], abs(rest[i])
+        for k in range(ways):
+            part = matrix[i * n + first + k] * push[k]
+            left, size = left + part, size + abs(part)
+        if abs(left) > DEPENDENT * size:
+            return False
+    return True
 
 
 @njit(cache=True, error_model="numpy")

@@ -65,6 +65,11 @@ def accelerate(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, 
         response.push(tile, m, w, lane, a)
         if m.gaps.tangents > 0 or m.gives:
             _rub(tile, m, w, lane)
+        for contact in range(m.gaps.size):
+            at, first = contact * width + lane, contact * ways
+            pulls = m.gaps.kind[contact] != DRY and g.found[first] < 0.0
+            if g.closed[at] != 0.0 and (pulls or (m.gaps.rubs[contact] > 0 and g.margin[at] < 0.0)):
+                g.dips[at] = 1.0
 
 
 @njit(cache=True, error_model="numpy")

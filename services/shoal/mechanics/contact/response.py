@@ -10,7 +10,7 @@ from shoal.compile.vector import clear
 from shoal.mechanics import dynamics, gaps
 from shoal.mechanics.derived import derive, fold
 from shoal.mechanics.dynamics import Work
-from shoal.mechanics.gaps import DRY, Gaps
+from shoal.mechanics.gaps import DRY, PLANE, SLIP, Gaps
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics.tile import Array, Tile
 
@@ -148,21 +148,39 @@ def tangent_of(m: Arrays, w: Work, contact: int, width: int, lane: int) -> None:
 
 
 @njit(cache=True, error_model="numpy")
+def turn_headings(m: Arrays, w: Work, width: int) -> None:
+    """Turn the directions of slip with the surfaces as they have moved since."""
+    for at in range(m.gaps.size * width):
+        if w.gaps.mode[at] == SLIP and m.gaps.kind[at // width] != DRY:
+            tangent_of(m, w, at // width, width, at % width)
+            head(m, w, at // width, width, at % width)
+
+
+@njit(cache=True, error_model="numpy")
 def along_heading(m: Arrays, w: Work, contact: int, width: int, lane: int) -> None:
     """Leave the direction in which a contact has slipped, by its tangents, in w.gaps.way."""
-    g, ways = w.gaps, 1 + m.gaps.tangents
+    g, ways, square = w.gaps, 1 + m.gaps.tangents, 0.0
+    if ways == PLANE:
+        g.way[contact * ways + 1] = g.heading[3 * contact * width + lane]
+        return
     for k in range(1, ways):
         row = contact * ways + k
         g.way[row] = 0.0
         for axis in range(3):
             part = g.axes[(9 * contact + 3 * k + axis) * width + lane]
             g.way[row] += part * g.heading[(3 * contact + axis) * width + lane]
+        square += g.way[row] ** 2
+    for k in range(1, ways):
+        g.way[contact * ways + k] /= np.sqrt(square)
 
 
 @njit(cache=True, error_model="numpy")
 def head(m: Arrays, w: Work, contact: int, width: int, lane: int) -> None:
-    """Keep the direction of slip in w.gaps.way as that in which a contact slips from now on, in the ground's axes."""
+    """Keep the direction of slip in w.gaps.way as that in which a contact slips from now on."""
     g, ways = w.gaps, 1 + m.gaps.tangents
+    if ways == PLANE:
+        g.heading[3 * contact * width + lane] = g.way[contact * ways + 1]
+        return
     for axis in range(3):
         total = 0.0
         for k in range(1, ways):
