@@ -217,5 +217,5 @@ def test_what_knows_no_stops_says_so() -> None:
         simulate(rod().model_copy(update={"initial_from": End.model_validate(dict(end))}), np.array([1.0]))
     with pytest.raises(InputError, match=r"solver\.integrator: radau5 knows no contacts, as of joints\.O\.stops"):
         simulate(rod(integrator="radau5"), np.array([1.0]))
-    with pytest.raises(InputError, match=r"joints\.O\.stops: engine exudyn cannot do stops; use gauss or mujoco"):
-        get_engine("exudyn").simulate(rod(), np.array([1.0]))
+    with pytest.raises(InputError, match=r"joints\.O\.stops: engine tree cannot do stops; use "):
+        get_engine("tree").simulate(rod(), np.array([1.0]))
