@@ -453,6 +453,10 @@ ONLY_NATIVE = [
         "fed-back",
         {"E": HANG},
     ).with_values({"loads": {"M": {"kind": "torque", "at": at("A"), "torque": "1 - 0.1*angle(A)"}}}),
+    pair(
+        "delayed",
+        {"E": HANG},
+    ).with_values({"states": {"x": {"rate": "1 - x"}}}),
     pendulum("at-rest", CABLE, CLAMP).with_values({"initial.from": "statics", "initial.A.rate": 0.0}),
     scene(
         "going-on",

@@ -146,6 +146,56 @@ def stribeck() -> dict[str, Any]:
     }  # fmt: skip
 
 
+def on_rail(mass: float, friction: float, scale: str, **more: Any) -> dict[str, Any]:
+    """A mass on a slider, without gravity, pushed by a formula."""
+    return {
+        "name": "on-rail",
+        "gravity": [0, 0],
+        "bodies": {"mass": {"kind": "point-mass", "mass": mass}},
+        "joints": {"rail": {"kind": "slider", "first": ground(0, 0), "second": {"body": "mass"}, "friction": friction}},
+        "loads": {"push": {"kind": "force", "at": {"body": "mass"}, "force": [1, 0], "scale": scale}},
+        "markers": {"mass": {"body": "mass"}},
+        "solver": {**FINE, "integrator": "dop853"},
+        **more,
+    }
+
+
+def saturated(size: float = 1.0) -> dict[str, Any]:
+    """PID with a limit and back-calculation as anti-windup."""
+    return on_rail(
+        1.5,
+        0.8,
+        "force",
+        signals={
+            "error": "1 - slide(rail)",
+            "wanted": "30*error + integral - 9*slide_rate(rail)",
+            "force": "min(max(wanted, -6), 6)",
+        },
+        states={"integral": {"rate": "40*error + (force - wanted)/0.25", "size": size}},
+    )
+
+
+def filtered() -> dict[str, Any]:
+    """Force by a transfer function of the error, of the same degree above and below, in controllable form.
+
+    20 (s/3 + 1)(s^2/400 + 1)/((s/30 + 1)(s/20 + 1)^2), with numerator b and denominator a divided by that of s^3.
+    """
+    num, den = [1 / 60, 0.05, 20 / 3, 20.0], [1 / 12000, 7 / 1200, 2 / 15, 1.0]
+    a, b = [one / den[0] for one in den[1:]], [one / den[0] for one in num]
+    c = [high - b[0] * low for high, low in zip(b[1:], a, strict=True)]
+    return on_rail(
+        1.0,
+        0.0,
+        f"{b[0]}*error + {c[0]}*x1 + {c[1]}*x2 + {c[2]}*x3",
+        signals={"error": "1 - slide(rail)"},
+        states={
+            "x1": {"rate": f"error - {a[0]}*x1 - {a[1]}*x2 - {a[2]}*x3", "size": 0.01},
+            "x2": {"rate": "x1", "size": 0.001},
+            "x3": {"rate": "x2", "size": 0.0001},
+        },
+    )
+
+
 def test_proportional_and_derivative_feedback() -> None:
     found = simulate(Scene.parse(pendulum()), np.array([0.05, 0.2, 0.5, 1.0, 2.0]))
     angle = [0.3056879204592912, 0.8738106876494041, 0.9033422410592403, 0.8984726148687577, 0.8977255510239434]
@@ -186,6 +236,49 @@ def test_friction_by_a_law_of_its_own() -> None:
     x = [0.04483970252600786, 0.04461792965559237, 0.04730800166176655, 0.06782904008090142]
     assert found.points[:, 0, 0, 0] == pytest.approx(x, abs=1e-8)
     assert found.energy_drift[0] < 1e-6
+
+
+@pytest.mark.parametrize("size", [1.0, 5.0])
+def test_a_saturated_controller_with_an_integral(size: float) -> None:
+    """Piecewise linear: by matrix exponentials between the switches."""
+    found = simulate(Scene.parse(saturated(size)), np.array([0.1, 0.3, 0.6, 1.0, 2.0, 4.0]))
+    x = [
+        0.0196491350633744,
+        0.170772032337347,
+        0.6145868678721135,
+        1.06830184252287,
+        1.031480501193049,
+        1.00107241343038,
+    ]
+    assert found.points[:, 0, 0, 0] == pytest.approx(x, abs=1e-10)
+    assert found.energy_drift[0] < 1e-7
+
+
+def test_a_transfer_function_as_states() -> None:
+    found = simulate(Scene.parse(filtered()), np.array([0.1, 0.3, 1.0, 3.0]))
+    x = [0.20137211964410195, 1.1080838993989486, 0.6492363457029577, 0.9708607064948382]
+    assert found.points[:, 0, 0, 0] == pytest.approx(x, abs=1e-9)
+
+
+@pytest.mark.parametrize(("integrator", "order"), [("rk4", 4), ("leapfrog", 2), ("semi-implicit-euler", 1)])
+def test_states_keep_the_order_of_the_integrator(integrator: str, order: int) -> None:
+    """x' = cos(3 t) - x from 0.5, beside a machine that it pushes."""
+    errors = []
+    for step in (2e-3, 1e-3):
+        data = on_rail(1.0, 0.2, "x", states={"x": {"rate": "cos(3*t) - x + 0*slide(rail)", "start": 0.5}})
+        solver = {"integrator": integrator, "step": step, "duration": 1.0}
+        errors.append(float(simulate(Scene.parse({**data, "solver": solver}), np.array([1.0])).points[0, 0, 0, 0]))
+    fine = simulate(Scene.parse(data), np.array([1.0]))
+    rate = math.log2(abs(errors[0] - fine.points[0, 0, 0, 0]) / abs(errors[1] - fine.points[0, 0, 0, 0]))
+    assert rate == pytest.approx(order, abs=0.4)
+
+
+def test_lanes_may_start_with_states_and_have_sizes_of_their_own() -> None:
+    scene = Scene.parse(on_rail(1.0, 0.0, "x", states={"x": {"rate": "-3*x", "start": 1.0}}))
+    starts, sizes, times = np.array([1.0, -2.0]), np.array([1.0, 4.0]), np.array([1.0])
+    found = simulate(scene, times, {"states.x.start": starts, "states.x.size": sizes})
+    exact = starts * (1.0 / 3 - (1 - math.exp(-3.0)) / 9)
+    assert found.points[0, 0, 0] == pytest.approx(exact, abs=1e-10)
 
 
 @pytest.mark.parametrize("integrator", ["rk4", "leapfrog", "dop853"])
@@ -303,12 +396,17 @@ def test_equal_parts_are_evaluated_once() -> None:
         ({"markers": {"arm": {"body": "arm", "point": "end"}}, "torque": "position(arm, x)"}, "of another place"),
         ({"signals": {f"s{k}": f"s{k + 1}*s{k + 1}" for k in range(20)} | {"s20": "t"}}, "too long where signals"),
         ({"signals": {f"s{k}": f"s{k + 1} + 1" for k in range(300)} | {"s300": "t"}}, "too long where signals"),
+        ({"states": {"x": {"rate": "-y"}}}, "states.x.rate: '-y' has 'y', which is not known; there are ref, phi, x"),
+        ({"states": {"phi": {"rate": 1.0}}}, "states.phi: there is a signal of this name"),
+        ({"states": {"max": {"rate": 1.0}}}, "states.max: the name is taken by formulas"),
+        ({"states": {"x": {"rate": 1.0, "size": 0.0}}}, "states.x.size"),
         ({"joints": {"drive": {"kind": "driven-angle", "angle": "phi"}}}, "'phi', which is not known; the time is `t`"),
     ],
 )
 def test_refused_in_one_line(changes: dict[str, Any], why: str) -> None:
     data = pendulum(changes.get("torque", "phi"))
-    for part in ("signals", "markers", "bodies"):
+    data["states"] = {}
+    for part in ("signals", "markers", "bodies", "states"):
         data[part] |= changes.get(part, {})
     for name, joint in changes.get("joints", {}).items():
         data["joints"][name] = {"first": {"body": "ground"}, "second": {"body": "arm"}, **joint}
@@ -374,6 +472,8 @@ def test_what_knows_no_signals_says_so() -> None:
     scene = Scene.parse(pendulum())
     with pytest.raises(InputError, match=r"loads.motor.torque: follows signals"):
         reactions(scene)
+    with pytest.raises(InputError, match=r"states.integral: motions know states, but not yet equilibria"):
+        statics(Scene.parse(saturated()))
     with pytest.raises(InputError, match=r"loads.motor.torque: steady motions take no signals"):
         modes(scene.with_values({"initial.arm.rate": 1.0}))
     with pytest.raises(InputError, match=r"solver.integrator: radau5 knows no signals, as of loads.motor.torque"):

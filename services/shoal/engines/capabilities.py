@@ -23,6 +23,7 @@ FEATURES = (
     "starts at the end of a run",
     "functions of time",
     "signals",
+    "states",
     "varying distances",
     "dry friction",
     "quadratic drag",
@@ -91,6 +92,7 @@ def needs(scene: Scene) -> Iterator[tuple[str, str]]:
         yield f"contacts.{name}", "contacts"
     for name, load in scene.loads.items():
         yield from _item(f"loads.{name}", load)
+    yield from ((f"states.{name}", "states") for name in scene.states)
 
 
 def _item(where: str, item: Joint | Load) -> Iterator[tuple[str, str]]:

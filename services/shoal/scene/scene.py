@@ -38,7 +38,7 @@ from shoal.scene.joints import GROUND, Attachment, Joint, MovingPoint, Universal
 from shoal.scene.loads import DistributedForce, Force, Load
 from shoal.scene.paths import key, parts, shared, unknown, unwrapped, with_lanes
 from shoal.scene.record import Record, Vector, one_line
-from shoal.scene.signals import check_signals
+from shoal.scene.signals import State, check_signals
 from shoal.scene.solids import ModalBody
 from shoal.scene.solver import Solver
 
@@ -76,6 +76,8 @@ class Scene(Record):
     """Loads by name."""
     signals: dict[SignalName, SignalFunction] = {}
     """Signals by name: formulas of time, measures of the machine and other signals, which loads may follow."""
+    states: dict[SignalName, State] = {}
+    """States of controllers, actuators and other dynamics of first order, by name."""
     ground_points: dict[Name, MovingPoint] = {}
     """Moving points of the ground by name."""
     markers: Annotated[dict[Name, Attachment], Field(min_length=1)]
@@ -118,6 +120,7 @@ class Scene(Record):
             _counted("contact", "contacts", self.contacts),
             _counted("load", "loads", self.loads),
             _counted("signal", "signals", self.signals),
+            _counted("state", "states", self.states),
             _counted("marker", "markers", self.markers),
         ]
         return f"Scene({self.name}: {'; '.join(part for part in parts if part)})"

@@ -1,4 +1,4 @@
-"""Signals: formulas of time, of measures of the machine and of each other, which loads follow.
+"""Signals: formulas of time, of measures of the machine, of states and of each other, which loads follow.
 
 A signal is written out by putting the formulas of others in place of their names, so that what depends on t alone is
 a function of time like any other. Numbers stay what they are by name: lanes may differ in them.
@@ -17,6 +17,7 @@ from shoal.scene.ended import End
 from shoal.scene.formula import MEASURES, Measure, Node, leaves
 from shoal.scene.function import Function, SignalFunction
 from shoal.scene.joints import GROUND, Attachment, Cylindrical, DrivenAngle, Revolute, Slider
+from shoal.scene.record import Positive, Record
 
 TAKEN = {"t", "pi", "e", *expression.ONE, *expression.MANY, *MEASURES}
 _MOST, _DEEPEST = 2000, 200
@@ -39,20 +40,41 @@ class Table:
     name: str
 
 
+@dataclass(frozen=True)
+class StateValue:
+    """A state, by its name."""
+
+    name: str
+
+
+class State(Record):
+    """A number that obeys an equation of first order, integrated with the motion, as of a filter or an integrator."""
+
+    rate: SignalFunction
+    """Its rate as a function of time, measures, signals and states [1/s]."""
+    start: float = 0.0
+    """Its value at the start [1]."""
+    size: Positive = 1.0
+    """What is large of it, so that it is as exact as a rate of so many SI units of the machine [1]."""
+
+
 def check_signals(scene: Any) -> None:
     """Raises ValueError for names that are taken or unknown, for measures that there are not, and for cycles."""
-    for name in scene.signals:
+    for part, name in [*(("signals", one) for one in scene.signals), *(("states", one) for one in scene.states)]:
         if name in TAKEN or keyword.iskeyword(name):
-            raise ValueError(f"signals.{name}: the name is taken by formulas; use another one")
+            raise ValueError(f"{part}.{name}: the name is taken by formulas; use another one")
+        if part == "states" and name in scene.signals:
+            raise ValueError(f"states.{name}: there is a signal of this name; use another one")
+    known = scene.signals.keys() | scene.states.keys()
     for where, function in signal_functions(scene):
         for leaf in _leaves(function):
             if isinstance(leaf, Measure):
                 _check_measure(scene, where, leaf)
-            elif leaf != "t" and leaf not in scene.signals:
-                known = f"; there are the signals {', '.join(scene.signals)}" if scene.signals else ""
-                raise ValueError(f"{where}: {function.expression!r} has {leaf!r}, which is not known{known}; t is time")
-    if isinstance(scene.initial_from, End) and (fields := following(scene)):
-        raise ValueError(f"initial.from: {fields[0]} follows signals, which do not yet start at the end of a run")
+            elif leaf != "t" and leaf not in known:
+                there = f"; there are {', '.join([*scene.signals, *scene.states])}" if known else ""
+                raise ValueError(f"{where}: {function.expression!r} has {leaf!r}, which is not known{there}; t is time")
+    if isinstance(scene.initial_from, End) and (fields := [*following(scene), *scene.states]):
+        raise ValueError(f"initial.from: signals and states ({fields[0]}) do not yet start at the end of a run")
     size, depth = dict[str, int](), dict[str, int]()
     for name in _order(scene.signals):
         function = scene.signals[name]
@@ -65,7 +87,7 @@ def check_signals(scene: Any) -> None:
 
 
 def signal_functions(scene: Any) -> Iterator[tuple[str, SignalFunction]]:
-    """Yield the signals of a scene and the functions of its loads that may depend on them, with their fields."""
+    """Yield the signals of a scene and the functions that may depend on them, with their fields."""
     for name, function in scene.signals.items():
         if isinstance(function, SignalFunction):  # else an array, one number a lane
             yield f"signals.{name}", function
@@ -73,17 +95,19 @@ def signal_functions(scene: Any) -> Iterator[tuple[str, SignalFunction]]:
         for field, value in load:
             if isinstance(value, SignalFunction):
                 yield f"loads.{name}.{field}", value
+    for name, state in scene.states.items():
+        yield f"states.{name}.rate", state.rate
 
 
 def following(scene: Any) -> list[str]:
-    """Return the fields of loads that are no functions of time alone."""
-    found = (where for where, one in signal_functions(scene) if where.startswith("loads.") and not one.of_time)
-    return list(found)
+    """Return the fields of loads, and of the rates of states, that are no functions of time alone."""
+    found = [where for where, one in signal_functions(scene) if not where.startswith("signals.") and not one.of_time]
+    return sorted(found, key=lambda where: where.startswith("states."))
 
 
 def written_out(scene: Any, function: SignalFunction) -> Node:
     """Return the tree of a function with the formulas of signals in place of their names."""
-    known: dict[str, Node] = {}
+    known: dict[str, Node] = {name: StateValue(name) for name in scene.states}
     for name in _order(scene.signals):
         one = scene.signals[name]
         if not isinstance(one, SignalFunction) or one.number is not None:

@@ -91,6 +91,11 @@ class Evaluator:
                 f"{model.gap_fields[0]}: motions, reactions, sensors, equilibria and modes take one-sided constraints, "
                 "but not yet steady motions and starts from the end of a run"
             )
+        if states := model.scene.states:
+            raise InputError(
+                f"states.{next(iter(states))}: motions know states, but not yet equilibria, modes, reactions, virtual "
+                "sensors, steady motions and starts from the end of a run"
+            )
         if model.signals and not signals:
             raise InputError(
                 f"{model.signal_fields[0]}: follows signals, which motions, equilibria and modes know, but not yet "

@@ -65,6 +65,8 @@ class Placement:
     drivers: dict[str, Affine] = field(default_factory=dict)
     """Moving points of the ground: vectors whose motion is prescribed."""
     terms: Terms = field(default_factory=Terms)
+    states: dict[str, int] = field(default_factory=dict)
+    """Unknowns whose rates are states of the user, by the size of these."""
 
     def new_vector(self, position: Array, velocity: Array) -> Affine:
         """Add a vector of unknowns with its initial value and rate, (d, lanes) each."""
@@ -79,6 +81,12 @@ class Placement:
         self.positions.append(sum(direction * (position - base)))
         self.velocities.append(sum(direction * velocity))
         return Affine({len(self.positions) - 1: direction}, base)
+
+    def add_state(self, name: str, start: Number) -> None:
+        """Add an unknown whose rate is a state of the user, with the start of that."""
+        self.states[name] = len(self.positions)
+        self.positions.append(0.0)
+        self.velocities.append(start)
 
     def start_of(self, where: Affine) -> tuple[Array, Array]:
         """Initial position and velocity of a vector."""

@@ -12,6 +12,7 @@ from shoal.mechanics import fitting, plane
 from shoal.mechanics.affine import Affine, fixed
 from shoal.mechanics.applied import Applied
 from shoal.mechanics.assembly.coordinates import Placement
+from shoal.mechanics.assembly.masses import STATE
 from shoal.mechanics.assembly.measures import ElementForceLaw, Measures, naming
 from shoal.mechanics.assembly.rods import rod_axis
 from shoal.mechanics.assembly.signals import SignalLoads
@@ -66,6 +67,9 @@ class Loads(Measures):
             if type(load) not in LOADS:
                 raise NotImplementedError(f"the mechanics knows no load of kind {load.kind!r}")
             LOADS[type(load)](self, name, load)
+        for name, state in scene.states.items():
+            number = self._function(f"states.{name}.rate", state.rate)
+            self.fixed.append((placement.states[name], STATE / state.size, number))
 
     def _friction(self, name: str, joint: Revolute | Slider) -> None:
         smoothed = 0.0 if joint.stick == "exact" else joint.coulomb  # else a contact, see `contacts`

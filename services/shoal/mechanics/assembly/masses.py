@@ -26,6 +26,8 @@ ADDED = np.array([1e-8, 1e-5])
 The first is for threads, whose constraints would seem dependent. Where an element is a thousand times as long as thick
 it is the larger one, and changes a frequency of torsion by less than 1e-3.
 """
+STATE = 1e-40
+"""Mass of an unknown whose rate is a state of the user: so small that its energy is none."""
 Entries = dict[tuple[int, int], Number]
 
 
@@ -53,6 +55,8 @@ class Masses:
             _add(self.mass, [vector], [[least]])
         for name in placement.terms.pressed:
             self._lend(name)
+        for unknown in placement.states.values():
+            self.mass[unknown, unknown] = STATE
 
     def _lend(self, name: str) -> None:
         """The place that a pin holds on the ground has its body's mass besides: it is at rest, so nothing else changes.

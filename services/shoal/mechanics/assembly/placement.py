@@ -35,8 +35,14 @@ from shoal.scene import GROUND, PointMass, Rod, Scene
 
 def place(scene: Scene) -> Placement:
     """Give every body its coordinates and initial state, and state what they must satisfy. Raises InputError."""
-    if scene.dimensions == 3:
-        return place_started(scene)
+    result = place_started(scene) if scene.dimensions == 3 else _place(scene)
+    for name, state in scene.states.items():
+        result.add_state(name, state.start / state.size)
+    return result
+
+
+def _place(scene: Scene) -> Placement:
+    """Place the bodies of the plane."""
     stated = scene
     scene, failed = started(scene)
     result = Placement(scene, failed)

@@ -17,7 +17,7 @@ from shoal.scene import GROUND, Attachment, Function, SignalFunction, Slider
 from shoal.scene.formula import Measure, Node
 from shoal.scene.function import Formula
 from shoal.scene.joints import Z
-from shoal.scene.signals import Constant, Table, is_of_time, joint_of, place, written_out
+from shoal.scene.signals import Constant, StateValue, Table, is_of_time, joint_of, place, written_out
 
 Operand = tuple[str, int]
 """A register: its section, and its number there."""
@@ -115,6 +115,8 @@ class SignalLoads:
             return "constant", len(self._constants) - 1
         if isinstance(node, Measure):
             return self._measure(node)
+        if isinstance(node, StateValue):
+            return self._state(field, node.name)
         if isinstance(node, Table) or is_of_time(node):
             function = self.scene.signals[node.name] if isinstance(node, Table) else Formula(node)
             self._functions.append(self._fit(field, function))
@@ -124,6 +126,17 @@ class SignalLoads:
             self._code.append((tape.MULTIPLY_ADD, [self._operand(field, part) for part in factors]))
         else:
             self._code.append((tape.CODES[operation], [self._operand(field, part) for part in parts]))
+        return "result", len(self._code) - 1
+
+    def _state(self, field: str, name: str) -> Operand:
+        """The rate of the unknown of a state, times the size of that."""
+        size = self.scene.states[name].size
+        self._rows["velocity"].append(self.measures.placement.states[name])
+        rate = "velocity", len(self._rows["velocity"]) - 1
+        if np.ndim(size) == 0 and size == 1.0:
+            return rate
+        self._constants.append(size)
+        self._code.append((tape.MULTIPLY, [rate, ("constant", len(self._constants) - 1)]))
         return "result", len(self._code) - 1
 
     def _product(self, parts: list[Node]) -> list[Node]:
