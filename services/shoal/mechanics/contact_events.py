@@ -14,7 +14,7 @@ from shoal.mechanics import kernels
 from shoal.mechanics.contact import response
 from shoal.mechanics.contact.impact import STILL, fastest
 from shoal.mechanics.dynamics import Work
-from shoal.mechanics.gaps import DRY, HIT, LIFT, RIGID, SLIDE, SLIP, STOP
+from shoal.mechanics.gaps import DRY, HIT, LIFT, PASS, RIGID, SLIDE, SLIP, STOP, is_outline
 from shoal.mechanics.integrators.scheme import Scheme, interpolate
 from shoal.mechanics.marched import LoopRoom
 from shoal.mechanics.model import Arrays
@@ -27,7 +27,10 @@ ITERATIONS = 60
 """At most so many of a root; halving alone would know it to round-off."""
 FRACTION = 1e-15
 """Width of a bracket, as a part of the step, that is a root."""
-VALUE, RATE, FORCE, MARGIN = range(4)
+BEFORE_JUMP = 1e-12
+"""Part of the step before the jump of the rate of what has come into an outline and nears its far side."""
+VALUE, RATE, FORCE, MARGIN, LEFT = range(5)
+QUANTITIES = 5
 TOUCHING = 1e3
 """A start that leaves less of a gap, in units of its resolution, closes it."""
 
@@ -53,12 +56,13 @@ def shift(tile: Tile, m: Arrays, w: Work) -> None:
     width = len(tile)
     count = m.gaps.size * width
     for at in range(count):
-        for what in range(4):
+        for what in range(QUANTITIES):
             w.gaps.before[what * count + at] = _read(m, w, width, at, what)
         w.gaps.dips[at] = 0.0
-        # A slip that has just begun is none but for round-off.
+        # A slip that has just begun is none but for round-off, and so is the way from the end of a feature.
         if w.gaps.mode[at] == SLIP:
             w.gaps.before[MARGIN * count + at] = max(w.gaps.before[MARGIN * count + at], 0.0)
+        w.gaps.before[LEFT * count + at] = max(w.gaps.before[LEFT * count + at], 0.0)
 
 
 @njit(cache=True, error_model="numpy")
@@ -83,6 +87,8 @@ def approach(tile: Tile, m: Arrays, w: Work, taken: float) -> bool:
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _read(m: Arrays, w: Work, width: int, at: int, what: int) -> float:
     g = w.gaps
+    if what == LEFT:
+        return g.left[at]  # type: ignore[no-any-return]
     if what == FORCE:
         return g.force[at // width * (1 + m.gaps.tangents) * width + at % width]  # type: ignore[no-any-return]
     return g.value[at] if what == VALUE else (g.rate[at] if what == RATE else g.margin[at])  # type: ignore[no-any-return]
@@ -116,6 +122,7 @@ def first(
         g.hit[at] = 0.0
         if g.closed[at] != 0.0:
             holding = holding or g.dips[at] != 0.0 or _pulls(m, w, width, at) or _turns(m, w, width, at)
+            near = near or g.left[at] < 0.0
         else:
             reach = 2.0 * taken * max(abs(g.before[RATE * count + at]), abs(g.rate[at]))
             near = near or min(g.before[at], g.value[at]) < reach
@@ -128,8 +135,9 @@ def first(
         for at in range(count):
             happens = False
             if g.closed[at] != 0.0:
+                happens = g.left[at] < 0.0
                 if holding:
-                    happens = g.before[FORCE * count + at] >= 0.0 and _pulls(m, w, width, at)
+                    happens = happens or (g.before[FORCE * count + at] >= 0.0 and _pulls(m, w, width, at))
                     happens = happens or (g.before[MARGIN * count + at] >= 0.0 and _turns(m, w, width, at))
             else:
                 dips = g.before[RATE * count + at] < 0.0 and g.rate[at] > 0.0
@@ -187,6 +195,11 @@ def _earliest(
                 turn = _root(*arguments, left, right, taken, tolerance, holding, at, MARGIN)
                 if turn < where[at]:
                     where[at], about[at] = turn, STOP if g.mode[at] == SLIP else SLIDE
+            _at(tile, scheme, m, w, k, t, right, taken, tolerance, holding)
+            if g.left[at] < 0.0:
+                end = _root(*arguments, left, right, taken, tolerance, holding, at, LEFT)
+                if end < where[at]:
+                    where[at], about[at] = end, PASS
         else:
             start, end = left, right
             if g.before[RATE * count + at] >= 0.0 and g.before[at] <= m.gaps.resolution:
@@ -195,6 +208,9 @@ def _earliest(
             if g.value[at] >= -m.gaps.resolution:
                 end = _root(*arguments, left, right, taken, tolerance, holding, at, RATE)
                 _at(tile, scheme, m, w, k, t, end, taken, tolerance, holding)
+                if g.value[at] >= -m.gaps.resolution and is_outline(m.gaps, at // width):
+                    end = max(end - BEFORE_JUMP, start)
+                    _at(tile, scheme, m, w, k, t, end, taken, tolerance, holding)
             if g.value[at] < -m.gaps.resolution:
                 where[at], about[at] = _root(*arguments, start, end, taken, tolerance, holding, at, VALUE), HIT
         found = min(found, where[at])

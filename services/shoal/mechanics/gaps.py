@@ -15,7 +15,7 @@ from numba import njit
 from shoal.mechanics import forces, pairs
 from shoal.mechanics.forces import ANGLE, DISTANCE, LAW, NATURAL, Forces
 from shoal.mechanics.numerics.tile import Array, Index, Tile
-from shoal.mechanics.pairs import Pairs
+from shoal.mechanics.pairs import PROFILE, Pairs
 
 LIMIT, DRY, PAIR = 0, 1, 2
 """Kinds of contacts: a limit of a measure, dry friction of a given force along a measure, two surfaces."""
@@ -27,7 +27,7 @@ PLANE = 2
 """Directions of a contact with one tangent."""
 STICK, SLIP = 1.0, 2.0
 """Modes of closed contacts that rub."""
-HIT, LIFT, SLIDE, STOP = 1.0, -1.0, 2.0, 3.0
+HIT, LIFT, SLIDE, STOP, PASS = 1.0, -1.0, 2.0, 3.0, 5.0
 """Events: a gap closes, a contact opens, one that sticks begins to slip, a slip ends."""
 
 
@@ -71,21 +71,22 @@ class GapWork(NamedTuple):
     memory: the continuous angles of angular measures. value, rate: g [m or rad] and its rate; margin: of a contact that
     slips the slip along `heading`, of one that sticks what is left to the limit of its friction. anchor: where a joint
     sticks by dry friction [rad or m]; its value is the way from there. speed: at which one that gives way was met
-    [m/s]. before: value, rate, force and margin at the beginning of a step, (4 * contacts, lanes). closed: whether the
-    contact is closed, unclear: whether its force was not unique at any time, in a way that moves the machine, mode:
-    whether it sticks or slips; hit: what event of it a step has ended at; impulse: at the last event. force: multiplier
-    by direction, of a closed contact along the normal not negative [N or N m]; near: those of the last decision; dips:
-    whether it, or the margin, was negative anywhere in the step. slip, bias: rate of each direction, and its derivative
-    for accelerations of zero. heading: direction of slip, of one tangent its sign along it, of two in the axes of the
-    ground as it was at the beginning of the step, (3 * contacts, lanes); axes: normal and tangents, (9 * contacts,
-    lanes). gradient, response: of each direction, and the acceleration by a unit force, (directions * unknowns, lanes).
-    none: the acceleration without forces, unit: a unit force, (rows, lanes). reaction: multipliers of the constraints:
-    without forces, by a unit force of each direction, and as they are, ((directions + 2) * constraints, lanes). matrix,
-    load, found, way, chosen: of one lane. pair: `pairs.describe`. order: of the last impact, how far the impulses of
-    contacts that strike one after the other would be from those at once, (lanes,). log: time, contact, kind, impulse
-    and `order` of each event of the first lane, (RECORD * LOGGED,); number: of events, decisions: times at which
-    contacts were decided on, alone: whether a lane of a tile of several comes near an event, which it has to meet
-    alone, (lanes,).
+    [m/s]. feature: of the outline of the second body, `kept` while the contact is closed; left: the way to its end [m],
+    onward: where that leads to (`profiles.touch`). before: value, rate, force, margin and left at the beginning of a
+    step, (5 * contacts, lanes). closed: whether the contact is closed, unclear: whether its force was not unique at any
+    time, in a way that moves the machine, mode: whether it sticks or slips; hit: what event of it a step has ended at;
+    impulse: at the last event. force: multiplier by direction, of a closed contact along the normal not negative [N or
+    N m]; near: those of the last decision; dips: whether it, or the margin, was negative anywhere in the step. slip,
+    bias: rate of each direction, and its derivative for accelerations of zero. heading: direction of slip, of one
+    tangent its sign along it, of two in the axes of the ground as it was at the beginning of the step, (3 * contacts,
+    lanes); axes: normal and tangents, (9 * contacts, lanes). gradient, response: of each direction, and the
+    acceleration by a unit force, (directions * unknowns, lanes). none: the acceleration without forces, unit: a unit
+    force, (rows, lanes). reaction: multipliers of the constraints: without forces, by a unit force of each direction,
+    and as they are, ((directions + 2) * constraints, lanes). matrix, load, found, way, chosen: of one lane. pair:
+    `pairs.describe`. order: of the last impact, how far the impulses of contacts that strike one after the other would
+    be from those at once, (lanes,). log: time, contact, kind, impulse and `order` of each event of the first lane,
+    (RECORD * LOGGED,); number: of events, decisions: times at which contacts were decided on, alone: whether a lane of
+    a tile of several comes near an event, which it has to meet alone, (lanes,).
     """
 
     memory: Array
@@ -94,6 +95,10 @@ class GapWork(NamedTuple):
     margin: Array
     anchor: Array
     speed: Array
+    feature: Array
+    kept: Array
+    left: Array
+    onward: Array
     before: Array
     closed: Array
     unclear: Array
@@ -138,7 +143,7 @@ def room(width: int, g: Gaps, unknowns: int, rows: int, constraints: int) -> Gap
     each, whole, reaction = n * width, rows * width if n else 0, (ways + 2) * constraints * width if n else 0
     vectors, by_way = ways * unknowns * width, ways * width
     sizes = {
-        "memory": g.measures.size * width, "before": 4 * each, "force": by_way, "near": by_way, "slip": by_way,
+        "memory": g.measures.size * width, "before": 5 * each, "force": by_way, "near": by_way, "slip": by_way,
         "bias": by_way,
         "heading": 3 * each, "axes": 9 * each, "gradient": vectors, "response": vectors, "none": whole, "unit": whole,
         "reaction": reaction, "matrix": ways * ways, "load": ways, "found": ways, "way": ways, "chosen": n,
@@ -223,10 +228,24 @@ def look(tile: Tile, gaps: Gaps, z: Array, zdot: Array, g: GapWork, room: Array)
                     g.margin[contact * width + lane] = slip_along(gaps, g, contact, width, lane)
 
 
+@njit(cache=True, error_model="numpy", forceinline=True)
+def is_outline(gaps: Gaps, contact: int) -> bool:
+    """Return whether the second surface of a contact is an outline of features."""
+    return gaps.kind[contact] == PAIR and gaps.pairs.shape[gaps.number[contact]] == PROFILE  # type: ignore[no-any-return]
+
+
 @njit(cache=True, error_model="numpy")
 def _look_at_pair(gaps: Gaps, contact: int, width: int, lane: int, z: Array, zdot: Array, g: GapWork) -> None:
-    ways, rows = 1 + gaps.tangents, pairs.pair_rows(gaps.pairs.dimensions)
-    pairs.describe(gaps.pairs, gaps.number[contact], width, lane, ways, z, zdot, g.pair)
+    ways, rows, number = 1 + gaps.tangents, pairs.pair_rows(gaps.pairs.dimensions), gaps.number[contact]
+    at = contact * width + lane
+    if is_outline(gaps, contact) and g.kept[at] == 0.0:
+        twin, other = gaps.pairs.profiles.twin[number], -1
+        beside = at + twin * width
+        if twin < 0 or (twin > 0 and g.kept[beside] != 0.0):
+            other = int(g.feature[beside])
+        g.feature[at] = pairs.nearest_feature(gaps.pairs, number, width, lane, z, zdot, other)
+    feature, kept = int(g.feature[at]), g.kept[at] != 0.0
+    g.left[at], g.onward[at] = pairs.describe(gaps.pairs, number, width, lane, ways, z, zdot, feature, kept, g.pair)
     g.value[contact * width + lane] = g.pair[0]
     for k in range(9):
         g.axes[(9 * contact + k) * width + lane] = g.pair[1 + k]

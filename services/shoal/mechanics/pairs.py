@@ -14,10 +14,12 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from shoal.mechanics import profiles
 from shoal.mechanics.numerics.tile import Array, Index
+from shoal.mechanics.profiles import Profiles
 
-FLAT, ROUND, HOLE = 0, 1, 2
-"""Shapes of the second surface: a line or plane, a circle or sphere (or a point), a hole."""
+FLAT, ROUND, HOLE, PROFILE = 0, 1, 2, 3
+"""Shapes of the second surface: a line or plane, a circle or sphere (or a point), a hole, an outline of features."""
 _STEP = 1e-100
 MOST_ROWS = 30
 ROOM = 3 * (MOST_ROWS + 2) + 10
@@ -31,7 +33,7 @@ class Pairs(NamedTuple):
     the bodies of the first and the second have an attitude, two a pair. rows: of each pair the place of the first and
     its directors (one in the plane, three in space), the same of the second, the normal of a flat surface and the axle
     of a disc; any valid rows where there are none. radius: of the first, and reach: the second's radius or zero [m],
-    both (pairs, lanes).
+    both (pairs, lanes). profiles: outlines, by pair.
     """
 
     dimensions: int
@@ -42,6 +44,7 @@ class Pairs(NamedTuple):
     rows: Index
     radius: Array
     reach: Array
+    profiles: Profiles
 
 
 @njit(cache=True, forceinline=True)
@@ -130,10 +133,42 @@ def _write(z, zdot, p, first, d, width, lane, sign, turns, u, arm, out, at):  # 
     return total
 
 
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _axis(z, zdot, p, number, width, lane):  # type: ignore[no-untyped-def]
+    """Return the x axis of the second body in the plane as a unit vector."""
+    if p.turns[2 * number + 1] == 0:
+        return (1.0 + 0j, 0j, 0j)
+    e = _vector(z, zdot, p.rows, pair_rows(2) * number + side_rows(2) + 2, 2, width, lane)
+    return _times(1.0 / np.sqrt(_dot(e, e)), e)
+
+
 @njit(cache=True, error_model="numpy")
-def describe(p: Pairs, number: int, width: int, lane: int, directions: int, z: Array, zdot: Array, out: Array) -> None:
+def nearest_feature(p: Pairs, number: int, width: int, lane: int, z: Array, zdot: Array, other: int) -> int:
+    """Return the feature of the second outline nearest to the first; other: see `profiles.nearest`. Pointers."""
+    first = pair_rows(2) * number
+    one = _vector(z, zdot, p.rows, first, 2, width, lane)
+    x = _along(one, -1.0, _vector(z, zdot, p.rows, first + side_rows(2), 2, width, lane))
+    e = _axis(z, zdot, p, number, width, lane)
+    along, across = x[0] * e[0] + x[1] * e[1], x[1] * e[0] - x[0] * e[1]
+    return profiles.nearest(p.profiles, number, along.real, across.real, other)  # type: ignore[no-any-return]
+
+
+@njit(cache=True, error_model="numpy")
+def describe(
+    p: Pairs,
+    number: int,
+    width: int,
+    lane: int,
+    directions: int,
+    z: Array,
+    zdot: Array,
+    feature: int,
+    kept: bool,
+    out: Array,
+) -> tuple[float, float]:
     """Describe a pair in one lane; derived rows of z and zdot must be filled. Pointers.
 
+    feature: of an outline, and whether it is kept. Returns the way left to its end, see `profiles.touch`, else 0.
     out: the gap [m] and, in three by three numbers, normal and tangents; then for each direction, the normal first, the
     gradient of the rate in the rates of the pair's rows, the rate [m/s] and its bias [m/s^2].
     """
@@ -143,7 +178,13 @@ def describe(p: Pairs, number: int, width: int, lane: int, directions: int, z: A
     other = _vector(z, zdot, p.rows, first + half, d, width, lane)
     x = _along(one, -1.0, other)
     radius, reach = p.radius[number * width + lane], p.reach[number * width + lane]
-    if p.shape[number] == FLAT:
+    left, way = 0.0, 0.0
+    if p.shape[number] == PROFILE:
+        e = _axis(z, zdot, p, number, width, lane)
+        along, across = x[0] * e[0] + x[1] * e[1], x[1] * e[0] - x[0] * e[1]
+        away, nx, ny, left, way = profiles.touch(p.profiles, number, feature, kept, along, across)
+        gap, n = away.real - radius, (nx * e[0] - ny * e[1], nx * e[1] + ny * e[0], 0j)
+    elif p.shape[number] == FLAT:
         n = _vector(z, zdot, p.rows, first + 2 * half, d, width, lane)
         n = _times(1.0 / np.sqrt(_dot(n, n)), n)
         gap = _dot(x, n).real - radius
@@ -171,13 +212,14 @@ def describe(p: Pairs, number: int, width: int, lane: int, directions: int, z: A
         out[0] = gap
     arm = _times(complex(-radius, 0.0), towards)
     far = _along(x, complex(-radius, 0.0), towards)
-    for way in range(directions):
-        u = n if way == 0 else (tangents[0] if way == 1 else tangents[1])
-        at = 10 + way * (rows + 2)
+    for k in range(directions):
+        u = n if k == 0 else (tangents[0] if k == 1 else tangents[1])
+        at = 10 + k * (rows + 2)
         total = _write(z, zdot, p, first, d, width, lane, 1.0, p.turns[2 * number] > 0, u, arm, out, at)
         total += _write(
             z, zdot, p, first + half, d, width, lane, -1.0, p.turns[2 * number + 1] > 0, u, far, out, at + half
         )
-        for k in range(2 * d):
-            out[at + 2 * half + k] = 0.0
+        for row in range(2 * d):
+            out[at + 2 * half + row] = 0.0
         out[at + rows], out[at + rows + 1] = total.real, total.imag / _STEP
+    return left, way

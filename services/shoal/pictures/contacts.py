@@ -82,7 +82,7 @@ class Limits:
     """The stops and the surfaces of contacts of a scene in the plane, with the markers that they are drawn by.
 
     A stop of a hinge is the arc of its range about the joint, beside the first body; one of a slider a tick across it.
-    Bodies that bend show none, as they have no axes of their own at a joint. Surfaces are circles and lines.
+    Bodies that bend show none, as they have no axes of their own at a joint. Surfaces are circles, lines and polygons.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -95,7 +95,8 @@ class Limits:
                 ends = [joint.stops.min, joint.stops.max]
                 lines = self._arc(ends) if isinstance(joint, Revolute) else self._ticks(ends, joint)
                 self._drawn[name] = self._carried(joint.first, lines)
-        for path, contact in contacts_of(scene).items() if scene.dimensions == 2 else ():
+        stated = {f"contacts.{name}": contact for name, contact in scene.contacts.items()}
+        for path, contact in (contacts_of(scene) | stated).items() if scene.dimensions == 2 else ():
             for field, side in (("first", contact.first), ("second", contact.second)):
                 if (outline := self._surface(side)) is not None and self._has_axes(side):
                     self._drawn[f"{path.removeprefix('contacts.')} {field}"] = self._carried(side, outline)
@@ -126,9 +127,14 @@ class Limits:
         return self._size * np.concatenate([arc, *ticks])
 
     def _surface(self, side: ContactSurface) -> Array | None:
-        """Return a circle about the place of a surface, or a line through it [m], (points, 2); None of a point."""
+        """Return a circle or a polygon about the place of a surface, or a line through it [m], (points, 2).
+
+        None of a point.
+        """
         if side.line is not None:
             return self._size * np.array([[-1.0], [1.0]]) * [np.cos(side.line), np.sin(side.line)]
+        if side.polygon is not None:
+            return np.array([*side.polygon, side.polygon[0]])
         angle = np.linspace(0.0, 2.0 * np.pi, 2 * ARC)
         radius = side.radius if side.hole is None else side.hole
         return radius * np.stack([np.cos(angle), np.sin(angle)], axis=1) if radius else None

@@ -1,4 +1,4 @@
-"""Joints with play as contacts: a pin in a hole, a ball in a socket, a box between the lines of its guide."""
+"""All contacts of a scene: those that it states, and those that hold joints with play: pins, balls and guided boxes."""
 
 from __future__ import annotations
 
@@ -33,7 +33,18 @@ def contacts_of(scene: Any) -> dict[str, Contact]:
                 rolling=False,
                 law=joint.law,
             )
-    return found | {f"contacts.{name}": contact for name, contact in scene.contacts.items()}
+    for name, contact in scene.contacts.items():
+        corners = _corners(scene, contact.first) if contact.first.polygon is not None else [contact.first]
+        for number, corner in enumerate(corners, 1):
+            path = f"contacts.{name}" + f".corner.{number}" * (len(corners) > 1)
+            found[path] = contact.model_copy(update={"first": corner})
+    return found
+
+
+def _corners(scene: Any, side: ContactSurface) -> list[ContactSurface]:
+    """Return the corners of a polygon, by which it touches a line."""
+    x, y = scene.location(side)[:2]
+    return [_surface(side.body, (x + a, y + b)) for a, b in side.polygon or ()]
 
 
 def _surface(body: str, point: Any, **shape: Any) -> ContactSurface:

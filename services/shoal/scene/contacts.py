@@ -10,13 +10,14 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from shoal.scene.contact_law import ContactLaw
 from shoal.scene.joints import Attachment, origin_of_ground
+from shoal.scene.polygons import check_polygon
 from shoal.scene.record import Angle, Axis, NonNegative, Positive, Record
 
-SHAPES = ("line", "plane", "hole")
+SHAPES = ("line", "plane", "hole", "polygon")
 
 
 class ContactSurface(Attachment):
-    """A place on a body and the surface around it: a point, a circle or sphere, a line, a plane or a hole."""
+    """A place on a body and the surface there: a point, a circle or sphere, a line, a plane, a hole or a polygon."""
 
     radius: NonNegative = 0.0
     """Radius of a circle, in space of a sphere, about the place [m]; 0 of a point."""
@@ -28,10 +29,13 @@ class ContactSurface(Attachment):
     """Normal of a plane through the place, as it points at the start, in space; it leads to the other body [1]."""
     hole: Positive | None = None
     """Radius of a hole about the place, in space hollow sphere, in which the other body is [m]."""
+    polygon: tuple[tuple[float, float], ...] | None = None
+    """Corners of a polygon from the place, in the axes of the body, in the plane [m]: counter-clockwise of a solid,
+    clockwise of a room in which the other body is."""
 
     @property
     def shape(self) -> str:
-        """Return `line`, `plane` or `hole`, or `round` of a circle, a sphere or a point."""
+        """Return `line`, `plane`, `hole` or `polygon`, or `round` of a circle, a sphere or a point."""
         return next((name for name in SHAPES if getattr(self, name) is not None), "round")
 
     @model_validator(mode="after")
@@ -41,6 +45,8 @@ class ContactSurface(Attachment):
             raise ValueError(f"{stated[1]}: {stated[0]} is stated as well; a surface has one shape")
         if self.axis is not None and not np.all(self.radius):
             raise ValueError("axis: is that of a disc; state its radius")
+        if self.polygon is not None:
+            check_polygon(self.polygon)
         return self
 
 
@@ -74,7 +80,7 @@ class Contact(Record):
 
     @model_validator(mode="after")
     def _two_surfaces(self) -> Contact:
-        if self.first.shape != "round":
+        if self.first.shape != "round" and (self.first.shape, self.second.shape) != ("polygon", "line"):
             raise ValueError(f"first.{self.first.shape}: the first side is a point or round; let this be the second")
         if self.first.body == self.second.body:
             raise ValueError(f"second.body: {self.second.body!r} is the first body as well; a contact needs two")
@@ -104,6 +110,8 @@ def check_contacts(scene: Any, contacts: Mapping[str, Contact]) -> None:
         if contact.second.shape == wrong:
             where = f"{path}.second.{wrong}"
             raise ValueError(f"{where}: with dimensions: {scene.dimensions} a flat surface is a {right}")
+        if scene.dimensions == 3 and contact.second.shape == "polygon":
+            raise ValueError(f"{path}.second.polygon: is of the plane; with dimensions: 3 state a plane, or a sphere")
         for field in ("first", "second"):
             side = getattr(contact, field)
             body = scene.bodies.get(side.body)
@@ -113,9 +121,9 @@ def check_contacts(scene: Any, contacts: Mapping[str, Contact]) -> None:
                 continue
             if side.axis is not None:
                 raise ValueError(f"{path}.{field}.axis: {side.body} is no rigid body, which a disc needs")
-            if side.shape in ("line", "plane"):
+            if side.shape in ("line", "plane", "polygon"):
                 where = f"{path}.{field}.{side.shape}"
-                raise ValueError(f"{where}: {side.body} is no rigid body, which a flat surface needs")
+                raise ValueError(f"{where}: {side.body} is no rigid body, which such a surface needs")
             if contact.rubs and kind != "point-mass" and np.any(side.radius or side.hole or 0.0):
                 raise ValueError(
                     f"{path}.{field}: friction at a radius of {side.body}, which bends; weld a rigid body to it, or "

@@ -373,7 +373,7 @@ class Slack(Record):
     """A sum that a joint keeps, or that may vary by its backlash and strikes both ends of that."""
 
     backlash: Positive | None = None
-    """Range in which the sum is free about its value at the start; by default it has none."""
+    """Range in which the sum is free about its value at the start [rad; of a coupling m]; by default it has none."""
     restitution: Annotated[float, Field(ge=0, le=1)] = 0.0
     """Of a joint with backlash: rate of the sum after an impact over that before [1]."""
 

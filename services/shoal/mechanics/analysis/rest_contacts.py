@@ -15,7 +15,7 @@ from shoal.mechanics.forces import ANGLE, DISTANCE, LAW, NATURAL, PLACE, Forces
 from shoal.mechanics.functions import Functions
 from shoal.mechanics.gaps import DRY, GIVES, PAIR
 from shoal.mechanics.numerics.tile import SINGLE, Array, Index, Tile
-from shoal.mechanics.pairs import FLAT, HOLE, Pairs, pair_rows, side_rows
+from shoal.mechanics.pairs import FLAT, HOLE, PROFILE, Pairs, pair_rows, side_rows
 
 if TYPE_CHECKING:
     from shoal.mechanics.analysis.evaluate import Evaluator
@@ -34,6 +34,10 @@ class RestContacts:
         if np.any(gaps.soft == GIVES):
             name = model.gap_fields[int(np.argmax(gaps.soft == GIVES))]
             raise InputError(f"{name}.law: equilibria and modes take rigid contacts; leave it out")
+        outlined = np.isin(gaps.kind, PAIR) & np.isin(gaps.number, np.flatnonzero(gaps.pairs.shape == PROFILE))
+        if np.any(outlined):
+            name = model.gap_fields[int(np.argmax(outlined))]
+            raise InputError(f"{name}.second.polygon: equilibria and modes take lines, circles and holes")
         self._evaluator, self.resolution = evaluator, gaps.resolution
         measured, of_pairs = gaps.measures, _measures(gaps.pairs)
         self._angles = measured.size

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from shoal.errors import InputError
+from shoal.mechanics import plane
 from shoal.mechanics.affine import Affine, fixed
 from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.assembly.measures import ElementForceLaw, Measures
@@ -17,8 +18,9 @@ from shoal.mechanics.forces import DISTANCE, LAW, NATURAL, PLACE
 from shoal.mechanics.frames import RigidFrame
 from shoal.mechanics.gaps import DRY, GIVES, LAW_SIZE, LIMIT, PAIR, RIGID, Gaps
 from shoal.mechanics.joints import conditions
-from shoal.mechanics.numerics.tile import Number, index, stacked
-from shoal.mechanics.pairs import FLAT, HOLE, ROUND, Pairs
+from shoal.mechanics.numerics.tile import Array, Number, index, stacked
+from shoal.mechanics.pairs import FLAT, HOLE, PROFILE, ROUND, Pairs
+from shoal.mechanics.profiles import CORNER, Profiles, chains
 from shoal.mechanics.reach import span
 from shoal.scene import (
     GROUND,
@@ -35,6 +37,7 @@ from shoal.scene import (
 )
 from shoal.scene.clearances import contacts_of
 from shoal.scene.joints import tightened
+from shoal.scene.polygons import corners_of, distance, is_concave
 
 RESOLUTION = 1e-12
 """Gaps below this part of the machine's size, or below it in rad, are closed: a thousand times round-off."""
@@ -63,6 +66,10 @@ class Contacts(Measures):
         """Whether a contact gives way, and the numbers of its law."""
         self._pairs: list[tuple[int, bool, list[bool], list[int], Number, Number]] = []
         """Shape, whether a disc, turning sides, rows, radius and reach of each pair of surfaces."""
+        self._chains: list[tuple[int, int, bool, int, tuple[int, int]]] = []
+        """First feature, their number, whether the last leads to the first, twin and outline of each pair."""
+        self._features: list[tuple[Array, Array]] = []
+        """Kinds and numbers of the features of all outlines."""
         for name, joint in scene.joints.items():
             if isinstance(joint, Revolute | Slider):
                 self._stops(name, joint)
@@ -82,7 +89,7 @@ class Contacts(Measures):
         shapes, discs, turns, rows, radii, reaches = zip(*self._pairs, strict=True) if self._pairs else ((),) * 6
         pairs = Pairs(
             self.scene.dimensions, len(self._pairs), index(shapes), index(discs),
-            index(turns).ravel(), index(rows).ravel(), stacked(radii), stacked(reaches),
+            index(turns).ravel(), index(rows).ravel(), stacked(radii), stacked(reaches), self._profiles(),
         )  # fmt: skip
         numbers = tuple(zip(*self._numbers, strict=True)) if size else ((),) * 5
         restitution, tangential, mu, mu_static, given = (stacked(part) for part in numbers)
@@ -106,6 +113,14 @@ class Contacts(Measures):
             stacked([part for _, law in self._laws for part in law]),
             RESOLUTION * float(np.max(span(self.scene))) if size else 0.0,
         )
+
+    def _profiles(self) -> Profiles:
+        """Return the outlines as arrays."""
+        begin, length, closed, twin, whole = zip(*self._chains, strict=True) if self._chains else ((),) * 5
+        kinds = [kind for kinds, _ in self._features for kind in kinds.tolist()]
+        numbers = np.concatenate([np.zeros(0), *(numbers.ravel() for _, numbers in self._features)])
+        outline = index(whole).ravel()
+        return Profiles(index(begin), index(length), index(closed), index(twin), outline, index(kinds), numbers)
 
     def _is_rough(self, k: int) -> bool:
         return self._each[k][0] == DRY or self._rolls[k] or bool(np.any(self._numbers[k][3]))
@@ -207,7 +222,7 @@ class Contacts(Measures):
         """Let two surfaces touch. path: of what states the contact."""
         first, second = contact.first, contact.second
         places = [self.placement.point(self.scene, side) for side in (first, second)]
-        shape = {"hole": HOLE, "round": ROUND}.get(second.shape, FLAT)
+        shape = {"hole": HOLE, "round": ROUND, "polygon": PROFILE}.get(second.shape, FLAT)
         normal = places[0]
         if shape == FLAT:
             direction = second.plane if second.line is None else second.line + math.pi / 2
@@ -215,22 +230,53 @@ class Contacts(Measures):
         axle = normal if first.axis is None else self.placement.line(first, first.axis)
         rows, turns = [], []
         for side, place in zip((first, second), places, strict=True):
-            directors = self._directors(side) if contact.rubs or shape == FLAT or first.axis is not None else []
+            turning = contact.rubs or shape in (FLAT, PROFILE) or first.axis is not None
+            directors = self._directors(side) if turning else []
             turns.append(bool(directors))
             rows += [place, *(directors or [place] * (1 if self.scene.dimensions == 2 else 3))]
         reach = second.radius if second.hole is None else second.hole
-        self._pairs.append(
-            (shape, first.axis is not None, turns, self.rows.of_all([*rows, normal, axle]), first.radius, reach)
-        )
+        parts = [(0, 0, False, 0, (0, 0))] if second.polygon is None else self._outline(corners_of(second.polygon))
         static = contact.mu if contact.mu_static is None else contact.mu_static
-        self._add(
-            path, PAIR, len(self._pairs) - 1, restitution=contact.restitution,
-            tangential=contact.tangential_restitution, mu=contact.mu, mu_static=static, rolls=contact.rolling,
-            law=None if contact.law is None else contact.law.numbers,
-        )  # fmt: skip
+        for chain in parts:
+            self._chains.append(chain)
+            self._pairs.append(
+                (shape, first.axis is not None, turns, self.rows.of_all([*rows, normal, axle]), first.radius, reach)
+            )
+            self._add(
+                path, PAIR, len(self._pairs) - 1, restitution=contact.restitution,
+                tangential=contact.tangential_restitution, mu=contact.mu, mu_static=static, rolls=contact.rolling,
+                law=None if contact.law is None else contact.law.numbers,
+            )  # fmt: skip
         flat = None if first.axis is None else axle
         if contact.law is None:
-            self._check(path, self._start_gap(shape, places, normal, flat, first.radius, reach), 0.0, LOWER)
+            gap = (
+                self._start_gap(shape, places, normal, flat, first.radius, reach)
+                if second.polygon is None
+                else self._outside(corners_of(second.polygon), places, self._directors(second)) - first.radius
+            )
+            self._check(path, gap, 0.0, LOWER)
+
+    def _outline(self, corners: Array) -> list[tuple[int, int, bool, int, tuple[int, int]]]:
+        """Add the chains of a polygon; return them for every pair of surfaces, of which some chains want two."""
+        found, every = [], chains(corners, is_concave(corners))
+        begin = sum(len(one) for one, _ in self._features)
+        whole = begin, begin + sum(len(kinds) for kinds, _, _ in every)
+        for kinds, numbers, turn in every:
+            self._features.append((kinds, numbers))
+            closed = kinds[0] == CORNER
+            # A body outside a chain that turns by less than half a turn touches it once.
+            twins = [1, -1] if not closed and turn >= math.pi else [0]
+            found += [(begin, len(kinds), closed, twin, whole) for twin in twins]
+            begin += len(kinds)
+        return found
+
+    def _outside(self, corners: Array, places: list[Affine], directors: list[Affine]) -> Number:
+        """Return how far the first place is outside a polygon at the start [m]."""
+        one, other = (self.placement.start_of(place)[0] for place in places)
+        axis = self.placement.start_of(directors[0])[0] if directors else np.array([[1.0], [0.0]])
+        away = one - other
+        across = plane.cross(axis, away)
+        return distance(corners, np.stack(np.broadcast_arrays(sum(axis * away), across)) / np.sqrt(sum(axis**2)))
 
     def _directors(self, side: ContactSurface) -> list[Affine]:
         """Return vectors that turn with a body; none for the ground, point masses, and rods, which touch at a point."""

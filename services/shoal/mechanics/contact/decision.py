@@ -14,9 +14,10 @@ from shoal.mechanics.contact import complementarity, coulomb, impact, motion, re
 from shoal.mechanics.contact.coulomb import FINE, KNOWN, OPEN, TROUBLES
 from shoal.mechanics.contact.impact import APART, SEPARATES, STILL, TOUCHES
 from shoal.mechanics.dynamics import ACCELERATION, Work
-from shoal.mechanics.gaps import DRY, HIT, LIFT, LOGGED, RECORD, RIGID, SLIDE, SLIP, STICK, STOP, press
+from shoal.mechanics.gaps import DRY, HIT, LIFT, LOGGED, PASS, RECORD, RIGID, SLIDE, SLIP, STICK, STOP, press
 from shoal.mechanics.model import Arrays
-from shoal.mechanics.numerics.tile import Array, Tile
+from shoal.mechanics.numerics.tile import Array, Flags, Tile
+from shoal.mechanics.profiles import CORNER
 
 MEET = 4.0
 """Event beside those of `gaps`: a contact that gives way is met."""
@@ -43,6 +44,7 @@ def decide(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float) -> None:
             _end(m, w, t, width, lane, TOO_MANY + TROUBLES * impact.struck(size, width, lane, g.hit))
     # The forces just before the event, which its search has left at other times.
     function_pointers.call(m.table.motion, (tile, m, w, t, w.z, w.zdot, tolerance, w.a, ACCELERATION))
+    passes = _pass(m, width, w)
     for at in range(size * width):
         near = g.value[at] <= m.gaps.resolution and m.gaps.soft[at // width] == RIGID
         state[at] = TOUCHES if g.hit[at] == HIT or g.closed[at] != 0.0 or near else APART
@@ -68,7 +70,31 @@ def decide(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float) -> None:
             elif m.gaps.rubs[at // width] > 0 and g.mode[at] == STICK and g.margin[at] < 0.0:
                 g.hit[at], again = SLIDE, True
         if not again:
-            return
+            break
+    for at in range(size * width):
+        g.kept[at] = g.closed[at]
+        if passes[at] and g.closed[at] == 0.0:
+            log(m, w, t, at // width, width, at % width, LIFT, 0.0)
+
+
+@njit(cache=True, error_model="numpy")
+def _pass(m: Arrays, width: int, w: Work) -> Flags:
+    """Let the contacts that have come to the end of a feature go on with the next one, and return which do.
+
+    A point goes round no corner.
+    """
+    g, chains = w.gaps, m.gaps.pairs.profiles
+    passes = np.zeros(m.gaps.size * width, dtype=np.bool_)
+    for at in range(m.gaps.size * width):
+        passes[at] = g.hit[at] == PASS
+        if passes[at]:
+            pair = m.gaps.number[at // width]
+            feature = (int(g.feature[at] + g.onward[at]) + chains.length[pair]) % chains.length[pair]
+            g.feature[at] = feature
+            radius = m.gaps.pairs.radius[pair * width + at % width]
+            if chains.kind[chains.begin[pair] + feature] == CORNER and radius == 0.0:
+                g.hit[at], passes[at] = LIFT, False
+    return passes
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
