@@ -15,6 +15,7 @@ from shoal.errors import InputError
 from shoal.imported import limits
 from shoal.imported.absent import absent
 from shoal.imported.actuators import add_actuators
+from shoal.imported.assets import do_without
 from shoal.imported.audit import MJCF, URDF, constraints, unread
 from shoal.imported.axes import Axes
 from shoal.imported.bodies import initial, is_mass, mass, rigid
@@ -65,7 +66,7 @@ def read(file: Path, root: Root | None = None, arguments: Mapping[str, str] | No
     if file.suffix == ".xacro" or any(one.tag.startswith("xacro:") for one in xml.walk()):
         xml = parse(file, expand(file, arguments or {}))
     with warnings.catch_warnings(record=True, action="always") as told:
-        robot = urdf_robot(mujoco, file, xml, root) if xml.tag == "robot" else Robot(_mjcf(mujoco, file))
+        robot = urdf_robot(mujoco, file, xml, root) if xml.tag == "robot" else _mjcf(mujoco, file, xml)
         model = _compiled(file, robot.spec)
     switch_off(mujoco, model)
     source = Source.of(mujoco, model)
@@ -82,11 +83,18 @@ def read(file: Path, root: Root | None = None, arguments: Mapping[str, str] | No
     return Imported(scene, tuple(parts.left_out), tuple(parts.missing), (*notes, *limits.note(parts)), warned)
 
 
-def _mjcf(mujoco: Any, file: Path) -> Any:
+def _mjcf(mujoco: Any, file: Path, root: XmlElement) -> Robot:
+    """Return the machine of an MJCF file. Raises InputError."""
+    if root.tag != "mujoco":
+        raise InputError(f"{file}: <{root.tag}>: no machine; import the file with <mujoco> that includes it")
+    for element in root.named("include"):
+        if not (file.parent / (path := element.attributes.get("file", ""))).is_file():
+            raise InputError(f"{file}: {element}: includes {path!r}, which is not found")
     try:
-        return mujoco.MjSpec.from_file(str(file))
+        spec = mujoco.MjSpec.from_file(str(file))
     except ValueError as error:
         raise InputError(f"{file}: {' '.join(str(error).split())}") from None
+    return Robot(spec, notes=do_without(mujoco, file, spec))
 
 
 def _compiled(file: Path, spec: Any) -> Any:
