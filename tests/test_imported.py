@@ -125,7 +125,8 @@ def test_a_loop_closes_rigidly_and_what_is_left_out_is_told(tmp_path: Path) -> N
     assert scene.joints["ja"].coulomb == pytest.approx(0.01)  # type: ignore[union-attr]
     told = "\n".join(found.left_out)
     assert scene.joints["ja"].stops.max == pytest.approx(np.pi / 2)  # type: ignore[union-attr]
-    for part in ("joint ja: its armature", "3 that touch", "1 that are only seen", "actuators: 1", "sensors: 1"):
+    assert scene.joints["ja"].armature == pytest.approx(0.02)  # type: ignore[union-attr]
+    for part in ("3 that touch", "1 that are only seen", "actuators: 1", "sensors: 1"):
         assert part in told
 
 

@@ -216,3 +216,31 @@ def test_macros_are_written_out(tmp_path: Path) -> None:
     path.write_text('<robot name="r"><xacro:arm/></robot>')
     with pytest.raises(InputError, match="xacro: unbound prefix"):
         read(path)
+
+
+def test_a_joint_that_mimics_another_follows_it(tmp_path: Path) -> None:
+    """Fingers on a hand that turns: slides, of which the second follows the first; MuJoCo couples alike."""
+    finger = (1e-4, 1e-4, 1e-4)
+    hand, first, second = (0.5, "0 0 .05", (1e-3, 1e-3, 5e-4)), (0.1, ".01 0 .02", finger), (0.2, "-.01 0 .02", finger)
+    mimic = '<mimic joint="f" multiplier="-0.7" offset="0.03"/>'
+    inside = link("hand", *hand) + link("one", *first) + link("two", *second)
+    inside += joint("w", "world", "hand", "0 1 .3") + joint("f", "hand", "one", "1 0 .2", "0 .02 .1", kind="prismatic")
+    inside += joint("g", "hand", "two", "1 0 0", "0 -.02 .1", mimic, kind="prismatic")
+    found = read(written(tmp_path, inside))
+    assert found.missing == ()
+    assert found.scene["joints"]["g-mimic"]["kind"] == "transmission"
+    model = mujoco.MjModel.from_xml_string("""<mujoco><option integrator="RK4" timestep="1e-4"/><worldbody><body>
+      <joint axis="0 1 .3"/><inertial pos="0 0 .05" mass=".5" diaginertia="1e-3 1e-3 5e-4"/>
+      <body name="one" pos="0 .02 .1"><joint name="f" type="slide" axis="1 0 .2"/>
+      <inertial pos=".01 0 .02" mass=".1" diaginertia="1e-4 1e-4 1e-4"/></body>
+      <body name="two" pos="0 -.02 .1"><joint name="g" type="slide" axis="1 0 0"/>
+      <inertial pos="-.01 0 .02" mass=".2" diaginertia="1e-4 1e-4 1e-4"/></body></body></worldbody><equality>
+      <joint joint1="g" joint2="f" polycoef=".03 -.7 0 0 0" solref="2e-4 1" solimp=".99999 .99999 .001 .5 2"/>
+      </equality></mujoco>""")
+    data = mujoco.MjData(model)
+    data.qpos[2] = 0.03
+    mujoco.mj_step(model, data, 2000)
+    mujoco.mj_kinematics(model, data)
+    ours = moved(found.scene, [0.2])
+    for name in ("one", "two"):
+        assert ours.marker(name)[0] == pytest.approx(data.body(name).xpos, abs=1e-6)

@@ -1,4 +1,4 @@
-"""Equalities: loops closed by `connect` and `weld` of bodies, and gears by linear ones of two hinges."""
+"""Equalities: loops closed by `connect` and `weld` of bodies, and transmissions by linear ones of joints."""
 
 from __future__ import annotations
 
@@ -8,15 +8,14 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from shoal.imported.axes import are_parallel
 from shoal.imported.parts import Parts
-from shoal.imported.rounding import ROUNDED, Array, numbers
+from shoal.imported.rounding import ROUNDED, Array
 from shoal.imported.source import Source
 from shoal.scene.joints import MOST_TEETH
 
 
 def add_equalities(source: Source, parts: Parts) -> None:
-    """Add the joints of equalities, after the tendons: closed loops and gears; lines for others."""
+    """Add the joints of equalities, after the tendons: closed loops and transmissions; lines for others."""
     model, kinds = source.model, source.mujoco.mjtEq
     for number, name in enumerate(source.called(source.mujoco.mjtObj.mjOBJ_EQUALITY, model.neq, "loop")):
         if number in parts.kept:
@@ -28,7 +27,7 @@ def add_equalities(source: Source, parts: Parts) -> None:
             parts.left_out.append(f"{what}, not active")
             continue
         if kind == kinds.mjEQ_JOINT:
-            joint, what = _gear(source, number), f"{what} {_coupled(source, number)}"
+            joint, what = _coupling(source, number, parts), f"{what} {_coupled(source, number)}"
         elif kind in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD):
             joint = _joint(source, number, kind == kinds.mjEQ_WELD)
             what += " in another pose than that of the start" * (joint is None)
@@ -45,26 +44,36 @@ def _coupled(source: Source, number: int) -> str:
     return f"{source.joint_names[driven]}{follows}"
 
 
-def _gear(source: Source, number: int) -> dict[str, Any] | None:
-    """The gear of a linear equality of two hinges on the ground."""
-    model = source.model
-    driven, driving = int(model.eq_obj1id[number]), int(model.eq_obj2id[number])
-    offset, ratio, *curved = model.eq_data[number][:5]
-    if driving < 0 or np.any(model.jnt_type[[driven, driving]] != int(source.mujoco.mjtJoint.mjJNT_HINGE)):
+def _coupling(source: Source, number: int, parts: Parts) -> dict[str, Any] | None:
+    """The transmission of a linear equality of hinges and slides; the ratio of hinges is rounded to whole teeth."""
+    driven, driving = int(source.model.eq_obj1id[number]), int(source.model.eq_obj2id[number])
+    factor, *curved = source.model.eq_data[number][1:5]
+    if driving >= 0 and any(curved):
         return None
-    if offset or any(curved) or abs(Fraction(ratio).limit_denominator(MOST_TEETH) - ratio) > 1e-9 * abs(ratio):
-        return None
-    bodies = [int(model.jnt_bodyid[one]) for one in (driving, driven)]
-    carried = any(source.owners[model.body_parentid[body]] for body in bodies)
-    if not ratio or carried or any(len(source.own(body)) != 1 for body in bodies):
-        return None
-    axis, second = source.data.xaxis[driving], source.data.xaxis[driven]
-    if parallel := are_parallel(axis, second):
-        ratio *= np.sign(axis @ second)
-    sides = zip(("first", "second"), bodies, (driving, driven), strict=True)
-    places = {side: source.at(body, source.data.xanchor[one]) for side, body, one in sides}
-    axes = {"axis": numbers(axis)} | ({} if parallel else {"second_axis": numbers(second)})
-    return {"kind": "gear", **places, "ratio": float(ratio), **axes}
+    terms = [(driven, 1.0)] + ([(driving, -float(factor))] if driving >= 0 and factor else [])
+    return transmission(source, terms, parts)
+
+
+def transmission(source: Source, terms: list[tuple[int, float]], parts: Parts) -> dict[str, Any] | None:
+    """The transmission of joints with factors of their coordinates; none where a joint is no hinge or slide alone."""
+    shares, hinges = [], list[float]()
+    for one, factor in terms:
+        made, kind = parts.joints.get(source.joint_names[one], {}), source.model.jnt_type[one]
+        types = source.mujoco.mjtJoint
+        kinds = {"revolute": int(types.mjJNT_HINGE), "slider": int(types.mjJNT_SLIDE)}
+        if kinds.get(made.get("kind", "")) != kind:
+            return None
+        # Where a joint is drawn from the body to its parent, its motion is the opposite.
+        if made["first"]["body"] == source.names[source.model.jnt_bodyid[one]]:
+            factor = -factor
+        if made["kind"] == "revolute":
+            hinges.append(factor)
+            ratio = Fraction(factor / hinges[0]).limit_denominator(MOST_TEETH)
+            if abs(float(ratio) * hinges[0] - factor) > 1e-12 * abs(factor):
+                parts.notes.append(f"joint {source.joint_names[one]}: its ratio {factor / hinges[0]:.12g} is {ratio}")
+            factor = float(ratio) * hinges[0]
+        shares.append({"joint": source.joint_names[one], "factor": factor})
+    return {"kind": "transmission", "terms": shares}
 
 
 def _joint(source: Source, number: int, weld: bool) -> dict[str, Any] | None:

@@ -31,7 +31,7 @@ def add_resistance(source: Source, own: list[int], made: dict[str, Any], parts: 
         _add_friction(source, one, made, parts)
         _add_spring(source, one, made, parts)
         add_stops(source, one, made, _is_simple(source, one, made), parts)
-        _tell_rest(source, one, parts)
+        _add_rotor(source, one, made, parts)
 
 
 def resists(source: Source, one: int) -> bool:
@@ -84,11 +84,16 @@ def _add_spring(source: Source, one: int, made: dict[str, Any], parts: Parts) ->
         parts.left_out.append(f"joint {name}: that its spring yields at {yielding:g}")
 
 
-def _tell_rest(source: Source, one: int, parts: Parts) -> None:
-    """Lines for what no joint of a scene has."""
+def _add_rotor(source: Source, one: int, made: dict[str, Any], parts: Parts) -> None:
+    """Armature."""
     model, name, dof = source.model, source.joint_names[one], source.model.jnt_dofadr[one]
-    if model.dof_armature[dof]:
-        parts.left_out.append(f"joint {name}: its armature {model.dof_armature[dof]:g}")
+    if not model.dof_armature[dof]:
+        return
+    if _is_simple(source, one, made):
+        made["armature"] = float(model.dof_armature[dof])
+    else:
+        left = f"joint {name}: its armature {model.dof_armature[dof]:g}; only a revolute joint or a slider has one"
+        parts.left_out.append(left)
 
 
 def _spring(source: Source, one: int, made: dict[str, Any], turned: dict[str, float]) -> dict[str, Any]:

@@ -6,8 +6,10 @@ start (`start.closure`) and pushes where its conditions forbid a motion (`analys
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -18,6 +20,7 @@ from shoal.mechanics.numerics.tile import Number
 from shoal.scene import Function, Scene
 from shoal.scene.joints import (
     GROUND,
+    MOST_TEETH,
     Attachment,
     CoupledCoordinate,
     Coupling,
@@ -29,8 +32,10 @@ from shoal.scene.joints import (
     Perpendicular,
     Planar,
     Revolute,
+    Share,
     Slider,
     Spherical,
+    Transmission,
     Universal,
     Weld,
     is_loose,
@@ -223,6 +228,48 @@ class Geared(JointCondition):
 
 
 @dataclass(frozen=True)
+class Transmitted(JointCondition):
+    """The sum of factor * free motion of joints stays that of the start, angles but for teeth that mesh again."""
+
+    shares: tuple[Share, ...]
+
+    @property
+    def is_of_start(self) -> bool:
+        """Return true: the sum is that of the start."""
+        return True
+
+    def constrain(self, name: str, bodies: Any) -> None:
+        """Require the sum of the unknowns that the machine has for it; separate bodies start as they do."""
+        phases = getattr(bodies, "phases", {})
+        if not phases:
+            return
+        turning = [one for one in self.shares if isinstance(bodies.scene.joints[one.joint], Revolute) and one.factor]
+        ways = [one for one in self.shares if one not in turning]
+        first = fixed(np.eye(3)[0][:, None])
+        bodies.terms.mesh(
+            name,
+            [(one.factor, phases[one.joint]) for one in turning],
+            _period(name, [one.factor for one in turning]),
+            lengths=int(bool(ways)),
+            further=[(first, phases[one.joint] * one.factor) for one in ways],
+        )
+
+
+def _period(name: str, factors: list[float]) -> float:
+    """Return the least sum of factors times whole turns [rad]. Raises InputError for ratios of too many teeth."""
+    if not factors:
+        return 1.0
+    ratios = [Fraction(one / factors[0]).limit_denominator(MOST_TEETH) for one in factors]
+    for ratio, factor in zip(ratios, factors, strict=True):
+        if abs(float(ratio) * factors[0] - factor) > 1e-12 * abs(factor) or abs(ratio.numerator) > MOST_TEETH:
+            raise InputError(
+                f"joints.{name}.terms: factors {factors[0]:.12g} and {factor:.12g} of hinges: their ratio must be a "
+                f"fraction of whole numbers up to {MOST_TEETH}; the nearest is {ratio}"
+            )
+    return 2.0 * np.pi * abs(factors[0]) / math.lcm(*(one.denominator for one in ratios))
+
+
+@dataclass(frozen=True)
 class Sum(JointCondition):
     """The sum of factor * coordinate follows a function of time [m]."""
 
@@ -369,6 +416,7 @@ SPATIAL: dict[type, Callable[[Any], list[JointCondition]]] = {
     Slider: _spatial_slider,
     Distance: CONDITIONS[Distance],
     Parallel: lambda j: [Aligned(j.first, j.second, None)],
+    Transmission: lambda joint: [Transmitted(joint.terms)],
     Perpendicular: lambda j: [Square(j.first, j.second, None, None)],
     DrivenAngle: lambda j: [Hinged(j.first, j.second, j.angle, j.axis)],
     Gear: _gear,

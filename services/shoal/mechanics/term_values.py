@@ -28,14 +28,14 @@ class TermValues:
         self, terms: Sequence[Term], dimensions: int, roots: Sequence[int] = (), counted: bool = False
     ) -> None:
         self.count, self._counted = len(terms), counted
-        products = [(row, one) for row, one in enumerate(terms) if one.has_product]
+        products = [(row, pair) for row, one in enumerate(terms) for pair in one.pairs]
         angles = [(row, *part) for row, one in enumerate(terms) for part in one.angles]
-        vectors = [(row, vector) for name in "uw" for row, one in products for vector in (getattr(one, name),)]
+        vectors = [*((row, u) for row, (u, _, _) in products), *((row, w) for row, (_, w, _) in products)]
         vectors += [(row, vector) for row, _, vector in angles]
         self._products = _index([row for row, _ in products])
         self._angled = np.array([[row == one for one in range(len(terms))] for row, *_ in angles], dtype=float)
         self._factors = laned([np.atleast_1d(factor) for _, factor, _ in angles], ())
-        self._form = np.array([one.form for _, one in products]).reshape(-1, dimensions, dimensions)
+        self._form = np.array([form for _, (*_, form) in products]).reshape(-1, dimensions, dimensions)
         self._roots = np.isin(self._products, _index(roots))
         self._constant = laned([vector.constant.T for _, vector in vectors], (dimensions,))
         self._drives = [one.drive for one in terms]
@@ -80,7 +80,7 @@ class TermValues:
             by_u[:, self._roots] = np.where(length[..., None] > 0, u[:, self._roots] / safe, axis)
             by_w[:, self._roots] = 0.0
         values = np.zeros((lanes, self.count))
-        values[:, self._products] = found
+        np.add.at(values.T, self._products, found.T)
         by_turned = np.zeros_like(turned)
         if len(self._angled):
             x, y = turned[..., 0], turned[..., 1]

@@ -25,7 +25,8 @@ class Term:
 
     form: (d, d). lengths: the power of a length that it is measured in. angles: factors and unit vectors whose angles
     [rad] are counted, in space in coordinates whose third axis is that which they turn about. period: of a term with
-    angles, multiples of which make no difference. of_start: whether the constant is such that it vanishes at the start
+    angles, multiples of which make no difference. of_start: whether the constant is such that it vanishes at the start.
+    further: pairs of vectors whose scalar products add
     """
 
     name: str
@@ -38,36 +39,29 @@ class Term:
     angles: tuple[tuple[Number, Affine], ...] = ()
     period: Number = 1.0
     of_start: bool = False
+    further: tuple[tuple[Affine, Affine], ...] = ()
 
     @property
-    def has_product(self) -> bool:
-        """Return whether it is more than a sum of angles."""
-        return all(bool(vector.terms) or bool(np.any(vector.constant)) for vector in (self.u, self.w))
+    def pairs(self) -> list[tuple[Affine, Affine, Array]]:
+        """Return the pairs of vectors with their forms whose products add; none of a sum of angles."""
+        every = [(self.u, self.w, self.form), *((u, w, np.eye(len(u.constant))) for u, w in self.further)]
+        return [one for one in every if all(vector.terms or np.any(vector.constant) for vector in one[:2])]
 
     def products(self, rows: Callable[[Affine], tuple[int, ...]]) -> list[tuple[int, int, Number, Affine, Affine]]:
         """(left row, right row, factor, left vector, right vector); left row -1 for a linear term."""
-        if not self.has_product:
-            return []
-        u, w, form = self.u, self.w, self.form
-        if not w.terms:
-            u, w, form = w, u, form.T
-        y = rows(w)
-        if not u.terms:
-            parts = [sum(f * part for f, part in zip(column, u.constant, strict=True)) for column in form.T]
-            return [(-1, y[k], part, u, w) for k, part in enumerate(parts) if np.any(part)]
-        x = rows(u)
-        return [(x[i], y[j], form[i, j], u, w) for i, j in zip(*np.nonzero(form), strict=True)]
+        return [product for pair in self.pairs for product in _products(*pair, rows)]
 
     def is_constant(self, size: float) -> bool:
         """Return whether every product of unknowns counts by round-off only. size: a length of the machine [m]."""
         if self.angles:
             return False
         small = NEGLIGIBLE * min(size**self.lengths, size ** (self.lengths - 1))
-        one, other = ({CONSTANT: vector.constant, **vector.terms} for vector in (self.u, self.w))
         found: dict[frozenset[int], Number] = {}
-        for (i, u), (j, w) in product(one.items(), other.items()):
-            found[frozenset((i, j))] = found.get(frozenset((i, j)), 0.0) + np.sum(u * (self.form @ w), axis=0)
-        found.pop(frozenset((CONSTANT,)))
+        for *sides, form in self.pairs:
+            one, other = ({CONSTANT: vector.constant, **vector.terms} for vector in sides)
+            for (i, u), (j, w) in product(one.items(), other.items()):
+                found[frozenset((i, j))] = found.get(frozenset((i, j)), 0.0) + np.sum(u * (form @ w), axis=0)
+        found.pop(frozenset((CONSTANT,)), None)
         return all(np.all(np.abs(factor) <= small) for factor in found.values())
 
     def slopes(self, rows: Callable[[Affine], tuple[int, ...]]) -> Iterator[tuple[int, int, Number]]:
@@ -84,9 +78,22 @@ class Term:
     def begin(self, value: Callable[[Affine], Array]) -> Term:
         """The same with the constant of a start; value: of a vector there, (d, lanes)."""
         found = sum((factor * plane.angle(value(vector)[:2]) for factor, vector in self.angles), np.zeros(1))
-        if self.has_product:
-            found = found + np.einsum("il,ij,jl->l", value(self.u), self.form, value(self.w))
+        for u, w, form in self.pairs:
+            found = found + np.einsum("il,ij,jl->l", value(u), form, value(w))
         return replace(self, constant=-found)
+
+
+def _products(
+    u: Affine, w: Affine, form: Array, rows: Callable[[Affine], tuple[int, ...]]
+) -> list[tuple[int, int, Number, Affine, Affine]]:
+    if not w.terms:
+        u, w, form = w, u, form.T
+    y = rows(w)
+    if not u.terms:
+        parts = [sum(f * part for f, part in zip(column, u.constant, strict=True)) for column in form.T]
+        return [(-1, y[k], part, u, w) for k, part in enumerate(parts) if np.any(part)]
+    x = rows(u)
+    return [(x[i], y[j], form[i, j], u, w) for i, j in zip(*np.nonzero(form), strict=True)]
 
 
 class Terms:
@@ -118,15 +125,16 @@ class Terms:
         period: Number,
         product: tuple[Affine, Affine] | None = None,
         lengths: int = 0,
+        further: Iterable[tuple[Affine, Affine]] = (),
     ) -> None:
         """u . w + sum of factor * angle of unit vector stays as at the start, but for multiples of the period.
 
-        product: u and w, if any; lengths: the power of a length that it is measured in
+        product: u and w, if any; further: more of them; lengths: the power of a length that it is measured in
         """
-        angles = tuple(angles)
-        u, w = product or (fixed(0.0 * angles[0][1].constant),) * 2
+        angles, further = tuple(angles), tuple(further)
+        u, w = product or (fixed(0.0 * (*angles, *further)[0][1].constant),) * 2
         form = np.eye(len(u.constant))
-        self.held.append(Term(name, u, w, form, 0.0, None, lengths, angles, period, of_start=True))
+        self.held.append(Term(name, u, w, form, 0.0, None, lengths, angles, period, of_start=True, further=further))
 
     def begin(self, value: Callable[[Affine], Array]) -> None:
         """Give all terms that vanish at the start their constants. value: of a vector there, (d, lanes)."""
@@ -139,12 +147,18 @@ class Terms:
         """
         for k, held in enumerate(self.held):
             if held.is_constant(size):
-                self.held[k] = replace(held, u=fixed(held.u.constant), w=fixed(held.w.constant))
+                further = tuple((fixed(u.constant), fixed(w.constant)) for u, w in held.further)
+                self.held[k] = replace(held, u=fixed(held.u.constant), w=fixed(held.w.constant), further=further)
 
     def press(self, name: str, condition: Any, before: int) -> None:
         """Note a joint whose force is asked for. before: number of constraints before its own."""
         if getattr(condition, "held", False):
             self.pressed[name] = before, len(self.held) - before
+
+    def add(self, name: str, pairs: Iterable[tuple[Affine, Affine]], lengths: int) -> None:
+        """The sum of scalar products vanishes, measured in m to the power of `lengths`."""
+        (u, w), *further = pairs
+        self.held.append(Term(name, u, w, np.eye(len(u.constant)), 0.0, None, lengths, further=tuple(further)))
 
     def vanish(self, name: str, vector: Affine, drives: tuple[Composed, ...] | None = None) -> None:
         """vector + drives(t) = 0, a linear constraint for each component [m]."""

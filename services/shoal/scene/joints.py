@@ -134,6 +134,8 @@ class Resisted(Tie):
     """Coefficient of dry friction by the joint's force [1], smoothed."""
     stops: Stops | None = None
     """Limits of its free motion."""
+    armature: NonNegative = 0.0
+    """Inertia of a rotor that the free motion turns, N^2 J behind a gear of the ratio N [kg m^2; of a slider kg]."""
 
     @model_validator(mode="after")
     def _of_one_law(self) -> Resisted:
@@ -433,6 +435,27 @@ class Gear(DirectionTie, Slack):
         return Fraction(self.ratio).limit_denominator(MOST_TEETH)
 
 
+class Share(Record):
+    """The free motion of a joint, with its factor in a transmission."""
+
+    joint: str
+    """Name of a revolute joint, whose angle [rad] counts, or of a slider, whose way [m] does."""
+    factor: float = 1.0
+    """Its factor [1 or m/rad]."""
+
+
+class Transmission(Record):
+    """The sum of factor * free motion of joints stays what it is at the start: gears, belts, racks that others carry.
+
+    The free motion is that of the second body against the first. In space only.
+    """
+
+    kind: Literal["transmission"] = "transmission"
+    turned: ClassVar[tuple[str, ...]] = ()
+    terms: Annotated[tuple[Share, ...], Field(min_length=1)]
+    """Joints with their factors. The ratios of those of hinges are fractions of whole numbers up to 1000."""
+
+
 class CoupledCoordinate(Record):
     """A coordinate of a place, with its factor in a coupling."""
 
@@ -475,6 +498,7 @@ Joint = Annotated[
         | Weld
         | Slider
         | Distance
+        | Transmission
         | Parallel
         | Perpendicular
         | DrivenAngle

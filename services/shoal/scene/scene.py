@@ -125,6 +125,15 @@ class Scene(Record):
         ]
         return f"Scene({self.name}: {'; '.join(part for part in parts if part)})"
 
+    def _check_shares(self, name: str, transmission: joint_types.Transmission) -> None:
+        able = [one for one, joint in self.joints.items() if joint.kind in ("revolute", "slider")]
+        for number, share in enumerate(transmission.terms):
+            if share.joint not in able:
+                raise ValueError(
+                    f"joints.{name}.terms.{number}.joint: must be a revolute joint or a slider of this scene, "
+                    f"{', '.join(able)[:200]}; found {share.joint!r}"
+                )
+
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         if self.starts_at_rest:
@@ -139,7 +148,9 @@ class Scene(Record):
         for name, joint in self.joints.items():
             for field, side in joint_types.sides(joint).items():
                 self._check_attachment(f"joints.{name}.{field}", side)
-            if not isinstance(joint, joint_types.Coupling) and joint.first.body == joint.second.body:
+            if isinstance(joint, joint_types.Transmission):
+                self._check_shares(name, joint)
+            elif not isinstance(joint, joint_types.Coupling) and joint.first.body == joint.second.body:
                 body = self.bodies.get(joint.first.body)
                 if body is None or body.element in FRAMED:
                     raise ValueError(
@@ -232,10 +243,10 @@ class Scene(Record):
         """Return the bodies whose position follows from joints to the ground or to a body with a stated position."""
         joined: dict[str, set[str]] = {}
         for joint in self.joints.values():
-            first, *others = (side.body for side in joint_types.places(joint))
-            for other in others:
-                joined.setdefault(first, set()).add(other)
-                joined.setdefault(other, set()).add(first)
+            bodies = [side.body for side in joint_types.places(joint)]
+            for other in bodies[1:]:
+                joined.setdefault(bodies[0], set()).add(other)
+                joined.setdefault(other, set()).add(bodies[0])
         reached = {GROUND, *(name for name, start in self.initial.items() if start.position is not None)}
         frontier = list(reached)
         while frontier:

@@ -50,7 +50,15 @@ class MujocoEngine(OneByOne):
             joints=frozenset({"revolute", "spherical", "slider", "weld"}),
             loads=frozenset(),
             features=frozenset(
-                {"machines in space", "free bodies", "point masses", "stops", "one-sided distances", "contacts"}
+                {
+                    "machines in space",
+                    "free bodies",
+                    "point masses",
+                    "stops",
+                    "armature",
+                    "one-sided distances",
+                    "contacts",
+                }
             ),
             lanes=False,
         )

@@ -191,6 +191,7 @@ class Mjcf:
         found = {
             "damping": joint.friction + sum(spring[1] for spring in springs),
             "frictionloss": joint.coulomb,
+            "armature": joint.armature,
             "stiffness": stiffness,
             "springref": moment / stiffness if stiffness else 0.0,
         }

@@ -14,8 +14,9 @@ import numpy as np
 from shoal.mechanics import joints, plane
 from shoal.mechanics.affine import Affine
 from shoal.mechanics.analysis.free_motion import FreeMotion
+from shoal.mechanics.assembly.phases import free_motion
 from shoal.mechanics.frames import BeamFrame, Frame, ModalFrame, PointFrame
-from shoal.mechanics.joints import Geared, Sum
+from shoal.mechanics.joints import Geared, Sum, Transmitted
 from shoal.mechanics.numerics.tile import Array, Index
 from shoal.scene import Revolute, Slider
 
@@ -53,6 +54,8 @@ def of_condition(motion: FreeMotion, name: str, condition: Any) -> Iterator[Comp
     """Yield the unknowns of one condition of a joint."""
     if isinstance(condition, Geared):
         yield _geared(motion, name, condition)
+    elif isinstance(condition, Transmitted):
+        yield _transmitted(motion, name, condition)
     elif isinstance(condition, Sum):
         yield _coupled(motion, name, condition)
     else:
@@ -108,6 +111,22 @@ def _geared(motion: FreeMotion, joint: str, condition: Geared) -> Component:
     return Component(joint, "torque", gradient, np.zeros((len(motion.at), motion.dimensions)), torques[0])
 
 
+def _transmitted(motion: FreeMotion, joint: str, condition: Transmitted) -> Component:
+    """Return torques about hinges and forces along sliders in proportion to their factors."""
+    units = []
+    for share in condition.shares:
+        one = motion.scene.joints[share.joint]
+        if isinstance(one, Slider):
+            along = one.direction if one.axis is None else one.axis
+            unit = pair(motion, joint, "transmitted", one, motion.line(one.first, along), None)
+        else:
+            assert isinstance(one, Revolute)
+            unit = pair(motion, joint, "transmitted", one, None, motion.pin(one))
+        units.append(unit.times(np.full(len(motion.at), share.factor)))
+    gradient = np.sum([one.gradient for one in units], axis=0)
+    return Component(joint, "transmitted", gradient, units[0].force, units[0].torque)
+
+
 def _coupled(motion: FreeMotion, joint: str, condition: Sum) -> Component:
     """Return forces along coordinates in proportion to their factors."""
     axes = ["xyz".index(term.axis) for term in condition.terms]
@@ -116,6 +135,42 @@ def _coupled(motion: FreeMotion, joint: str, condition: Sum) -> Component:
     force = condition.terms[0].factor * motion.axes[axes[0]]
     gradient = np.broadcast_to(row, (len(force), motion.bodies.unknowns))
     return Component(joint, "coupled", gradient, force, np.zeros((len(force), motion.turn_axes)))
+
+
+def rotors(motion: FreeMotion, change: Array) -> Array:
+    """Return the generalised forces of rotors: armature times the acceleration of the free motion, against that.
+
+    change: accelerations of the free bodies, as the result (samples, unknowns)
+    """
+    total = np.zeros_like(change)
+    for name, joint in motion.scene.joints.items():
+        if not isinstance(joint, Revolute | Slider) or not joint.armature:
+            continue
+        if isinstance(joint, Slider):
+            along = joint.direction if joint.axis is None else joint.axis
+            unit = pair(motion, name, "rotor", joint, motion.line(joint.first, along), None)
+        else:
+            unit = pair(motion, name, "rotor", joint, None, motion.pin(joint))
+        products = free_motion(motion.scene, joint, motion.placement)
+        (x, *y), (xdd, *ydd) = ([_derivative(motion, change, *one, order) for one in products] for order in (0, 2))
+        acceleration = x * ydd[0] - y[0] * xdd if y else xdd
+        total -= unit.gradient * (joint.armature * acceleration)[:, None]
+    return total
+
+
+def _derivative(motion: FreeMotion, change: Array, one: Affine, other: Affine, order: int) -> Array:
+    """Return a scalar product of vectors, or its second derivative by time, (samples,)."""
+    p, q = motion.value(one), motion.value(other)
+    if order == 0:
+        return np.asarray(np.sum(p * q, axis=1))
+    (pd, qd), (pdd, qdd) = ([_rate(vector, x) for vector in (one, other)] for x in (motion.rate, change))
+    return np.asarray(np.sum(pdd * q + 2.0 * pd * qd + p * qdd, axis=1))
+
+
+def _rate(vector: Affine, x: Array) -> Array:
+    """Return the linear part of a vector at rates or accelerations (samples, unknowns), (samples, d)."""
+    unknowns, coefficients, _ = vector.by_lane
+    return np.asarray(x[:, unknowns] @ coefficients[0])
 
 
 def friction(motion: FreeMotion, held: Mapping[str, Array]) -> dict[str, Component]:

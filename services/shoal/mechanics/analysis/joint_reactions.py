@@ -23,7 +23,15 @@ from shoal.mechanics.analysis.contact_forces import CONTACT, ContactForce, conta
 from shoal.mechanics.analysis.evaluate import Evaluator, Pressing
 from shoal.mechanics.analysis.free_bodies import FreeBodies
 from shoal.mechanics.analysis.free_motion import FreeMotion
-from shoal.mechanics.analysis.joint_forces import Component, Displacements, components, displacements, friction, work
+from shoal.mechanics.analysis.joint_forces import (
+    Component,
+    Displacements,
+    components,
+    displacements,
+    friction,
+    rotors,
+    work,
+)
 from shoal.mechanics.analysis.reaction_findings import ReactionsStatus
 from shoal.mechanics.analysis.singular import SHARE, nearby_freedom
 from shoal.mechanics.event_record import place_of
@@ -33,7 +41,7 @@ from shoal.mechanics.numerics.tile import Array, Flags
 from shoal.mechanics.reach import span
 from shoal.mechanics.rubbing import ROUNDS, SETTLED
 from shoal.scene import Attachment, Coupling, Revolute, Scene, Slider
-from shoal.scene.joints import places
+from shoal.scene.joints import Transmission, places
 
 RANK = 1e-9
 BALANCED = 1e-6
@@ -236,7 +244,7 @@ def exerted(
     kept = singular > RANK * singular[:, :1]
     inverse = np.where(kept, 1.0 / np.where(kept, singular, 1.0), 0.0)
     touching = [one for of_field in acting.values() for one in of_field]
-    pressing = sum((one.component.gradient for one in touching), np.zeros_like(force))
+    pressing = sum((one.component.gradient for one in touching), rotors(motion, change))
     held: dict[str, Array] = {}
     for _ in range(ROUNDS):
         rubbed = friction(motion, held)
@@ -320,7 +328,7 @@ def reactions_of(
         found[name] = JointReaction(
             name,
             joint.kind,
-            tuple(motion.place(_second(joint))[0].tolist()),
+            tuple(motion.place(_second(motion.scene, joint))[0].tolist()),
             tuple(force),
             torque[0] if len(torque) == 1 else tuple(torque),
             {part: float(size[0]) for part, size in told.components(name).items()},
@@ -382,5 +390,7 @@ def _sharing(evaluator: Evaluator, q: Array, t: float) -> Array:
     return np.asarray(np.max(np.abs(near.dependent), axis=1, initial=0.0))
 
 
-def _second(joint: Any) -> Attachment:
+def _second(scene: Scene, joint: Any) -> Attachment:
+    if isinstance(joint, Transmission):
+        joint = scene.joints[joint.terms[0].joint]
     return places(joint)[0] if isinstance(joint, Coupling) else joint.second

@@ -67,6 +67,8 @@ class Placement:
     terms: Terms = field(default_factory=Terms)
     states: dict[str, int] = field(default_factory=dict)
     """Unknowns whose rates are states of the user, by the size of these."""
+    phases: dict[str, Affine] = field(default_factory=dict)
+    """Free motions of joints, see `phases`."""
 
     def new_vector(self, position: Array, velocity: Array) -> Affine:
         """Add a vector of unknowns with its initial value and rate, (d, lanes) each."""

@@ -17,7 +17,7 @@ from shoal.mechanics.elements.unstrained import unstrained
 from shoal.mechanics.frames import BeamFrame, ModalFrame, PointFrame, RigidFrame
 from shoal.mechanics.joints import Meet, conditions
 from shoal.mechanics.numerics.tile import Array, Number
-from shoal.scene import GROUND, Body, RigidBody, Rod, Scene
+from shoal.scene import GROUND, Body, Revolute, RigidBody, Rod, Scene, Slider
 from shoal.scene.dimensions import padded
 
 ADDED = np.array([1e-8, 1e-5])
@@ -28,6 +28,8 @@ it is the larger one, and changes a frequency of torsion by less than 1e-3.
 """
 STATE = 1e-40
 """Mass of an unknown whose rate is a state of the user: so small that its energy is none."""
+PHASE = 1e-9
+"""Mass of an unknown of a joint without a rotor, per inertia of the lighter body: accelerations change by as little."""
 Entries = dict[tuple[int, int], Number]
 
 
@@ -53,10 +55,31 @@ class Masses:
             # The motion of a moving point of the ground is prescribed, so its mass is of no consequence.
             least = min(np.min(np.asarray(body.mass)) for body in scene.bodies.values())
             _add(self.mass, [vector], [[least]])
+        for name, vector in placement.phases.items():
+            _add(self.mass, [vector], [[self._of_phase(name)]])
         for name in placement.terms.pressed:
             self._lend(name)
         for unknown in placement.states.values():
             self.mass[unknown, unknown] = STATE
+
+    def _of_phase(self, name: str) -> Number:
+        """Return the mass of the free motion of a joint: of its rotor [kg m^2 or kg], and a negligible one."""
+        joint = self.scene.joints[name]
+        assert isinstance(joint, Revolute | Slider)
+        least = np.inf
+        for side in (joint.first, joint.second):
+            body = self.scene.bodies.get(side.body)
+            if body is None:
+                continue
+            assert isinstance(body, Rod | RigidBody)
+            if isinstance(joint, Slider):
+                size = body.mass
+            elif self.scene.dimensions == plane.DIMENSIONS:
+                size = body.inertia
+            else:
+                size = sum(row[k] for k, row in enumerate(second_moments(body)))
+            least = min(least, float(np.min(size)))
+        return joint.armature + PHASE * least
 
     def _lend(self, name: str) -> None:
         """The place that a pin holds on the ground has its body's mass besides: it is at rest, so nothing else changes.

@@ -22,6 +22,7 @@ from shoal.mechanics.assembly.groups import (
     transposed,
 )
 from shoal.mechanics.assembly.modal import place_modal
+from shoal.mechanics.assembly.phases import make_phases
 from shoal.mechanics.assembly.placing import hold, next_body, place_driver, place_point
 from shoal.mechanics.assembly.rods import place_rod, rod_axis
 from shoal.mechanics.assembly.space.start import place_started
@@ -73,6 +74,7 @@ def _place(scene: Scene) -> Placement:
         if point.line and not point.on_line and point.where is not None:
             joint, base, direction = point.line
             result.terms.cross(joint, fixed(direction), point.where - fixed(base), 1)
+    make_phases(scene, result)
     hold(scene, result)
     result.terms.begin(lambda vector: result.start_of(vector)[0])
     return result

@@ -20,6 +20,7 @@ from shoal.mechanics import rotation as turns
 from shoal.mechanics.affine import Affine, combined, fixed
 from shoal.mechanics.assembly.coordinates import Pose, arm
 from shoal.mechanics.assembly.groups import JointPoint, is_stiff, rotated, transposed
+from shoal.mechanics.assembly.phases import make_phases
 from shoal.mechanics.assembly.placing import hold, next_body, place_driver, place_point
 from shoal.mechanics.assembly.space.axes import JointAxis
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
@@ -65,6 +66,7 @@ def place_in_space(scene: Scene, poses: Mapping[str, tuple[Array, Array]] | None
             joint, base, direction = point.line
             for normal in turns.across(direction):
                 result.terms.dot(joint, fixed(normal), point.where - fixed(base), 1)
+    make_phases(scene, result)
     hold(scene, result)
     for joint, condition in joints.of_scene(scene):
         sides_of_rods = isinstance(condition, Aligned | Turned | Square) and not all(
