@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from shoal.engines import get_engine
 from shoal.errors import InputError
+from shoal.mechanics.analysis.reactions import reactions
 from shoal.mechanics.analysis.statics import statics
 from shoal.mechanics.simulate import simulate
 from shoal.scene import Scene
@@ -274,6 +275,17 @@ def test_a_box_of_a_polygon_rocks_on_a_line_until_it_stands() -> None:
     assert [event["corner"] for event in struck] == [2, 1, 2, 1, 2]
 
 
+def test_the_corners_of_a_box_at_rest_bear_its_weight_together() -> None:
+    box = [[-0.1, -0.1], [0.1, -0.1], [0.1, 0.1], [-0.1, 0.1]]
+    floor = {"first": {"body": "B", "polygon": box}, "second": {"body": "ground", "line": 0.0}, "mu": 0.3}
+    scene = machine(DISC, {"floor": floor}, {"position": [0.5, 0.1]}, 1.0)
+    (found,) = reactions(scene, [0.5])
+    told = found.contacts["floor"]
+    assert told.normal == pytest.approx(2.0 * G, abs=1e-10)
+    assert told.at == pytest.approx([0.5, 0.0], abs=1e-10)
+    assert told.state == "sticks"
+
+
 def test_lanes_of_discs_roll_bounce_and_fly_as_alone() -> None:
     scene, times = hill(0.3, 0.9), np.linspace(0.0, 0.9, 7)
     values = {"initial.B.velocity.0": np.array([0.3, 1.0, 2.0, 3.0])}
@@ -310,6 +322,9 @@ def test_polygons_are_refused_by_name_where_nothing_knows_them() -> None:
         simulate(machine(DISC, {"c": contact}, {"position": [0.25, 0.25]}, 1.0), np.array([1.0]))
     with pytest.raises(InputError, match=r"contacts\.c\.second\.polygon: equilibria and modes take lines, circles"):
         statics(machine(DISC, {"c": contact}, {"position": [2.0, 2.0]}, 1.0))
+    for engine in ("exudyn", "mujoco"):
+        with pytest.raises(InputError, match=rf"contacts\.c\.second\.polygon: engine {engine} cannot do polygons"):
+            get_engine(engine).simulate(machine(DISC, {"c": contact}, {"position": [2.0, 2.0]}, 1.0))
     both = {"first": {"body": "B", "polygon": TRIANGLE}, "second": {"body": "ground", "polygon": TRIANGLE}}
     with pytest.raises(InputError, match=r"first\.polygon: the first side is a point or round"):
         machine(DISC, {"c": both}, {"position": [2.0, 2.0]}, 1.0)

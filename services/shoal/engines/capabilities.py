@@ -39,6 +39,8 @@ FEATURES = (
     "one-sided distances",
     "exact stick",
     "contacts",
+    "polygons",
+    "corners of polygons",
     "play",
     "backlash",
     "armature",
@@ -90,8 +92,12 @@ def needs(scene: Scene) -> Iterator[tuple[str, str]]:
         if not isinstance(joint, Coupling | Transmission) and joint.first.body == joint.second.body:
             yield f"joints.{name}", "closed rods"
     yield from ((f"joints.{name}", "closed loops") for name in loops(scene))
-    for name in scene.contacts:
+    for name, contact in scene.contacts.items():
         yield f"contacts.{name}", "contacts"
+        if contact.second.polygon is not None:
+            yield f"contacts.{name}.second.polygon", "polygons"
+        if contact.first.polygon is not None:
+            yield f"contacts.{name}.first.polygon", "corners of polygons"
     for name, load in scene.loads.items():
         yield from _item(f"loads.{name}", load)
     yield from ((f"states.{name}", "states") for name in scene.states)

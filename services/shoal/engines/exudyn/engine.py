@@ -56,6 +56,7 @@ FEATURES = frozenset(
         "stops",
         "one-sided distances",
         "contacts",
+        "corners of polygons",
         "play",
     }
 )

@@ -11,7 +11,7 @@ from shoal.mechanics import plane
 from shoal.mechanics.analysis.evaluate import Pressing
 from shoal.mechanics.analysis.free_motion import FreeMotion
 from shoal.mechanics.analysis.joint_forces import Component, of_condition, pair
-from shoal.mechanics.gaps import RIGID, SLIP, Gaps
+from shoal.mechanics.gaps import RIGID, SLIP, STICK, Gaps
 from shoal.mechanics.joints import conditions
 from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import Array, Flags
@@ -65,6 +65,31 @@ def contact_forces(
             one = _in_joint(motion, model.gaps, number, path, here)
         found.setdefault(path, []).append(one)
     return found
+
+
+def together(parts: Sequence[ContactForce]) -> ContactForce:
+    """Return the sum of the forces of one contact that touches at several places, where the force that presses is.
+
+    It sticks where one of them does, as they are of one body.
+    """
+    first, *others = parts
+    if not others:
+        return first
+    normal, friction, force = (
+        np.asarray(sum(part))
+        for part in zip(*((one.normal, one.friction, one.component.force) for one in parts), strict=True)
+    )
+    weights = [np.where(normal != 0.0, one.normal, 1.0)[:, None] for one in parts]
+    at = sum(weight * one.at for weight, one in zip(weights, parts, strict=True)) / sum(weights)
+    modes = np.stack([one.state for one in parts])
+    state = np.where(np.any(modes == STICK, axis=0), STICK, np.max(modes, axis=0))
+    return first._replace(
+        component=first.component._replace(force=force),
+        at=np.asarray(at),
+        normal=normal,
+        friction=friction,
+        state=state,
+    )
 
 
 def _in_joint(motion: FreeMotion, gaps: Gaps, number: int, path: str, here: Pressing) -> ContactForce:

@@ -19,7 +19,7 @@ from shoal.findings import Concluded, Finding, worst_implied
 from shoal.json_values import plain
 from shoal.mechanics.analysis import reaction_findings as kinds
 from shoal.mechanics.analysis.balance import metric_of
-from shoal.mechanics.analysis.contact_forces import CONTACT, ContactForce, contact_forces
+from shoal.mechanics.analysis.contact_forces import CONTACT, ContactForce, contact_forces, together
 from shoal.mechanics.analysis.evaluate import Evaluator, Pressing
 from shoal.mechanics.analysis.free_bodies import FreeBodies
 from shoal.mechanics.analysis.free_motion import FreeMotion
@@ -215,10 +215,11 @@ class Exerted(NamedTuple):
         return list(own)
 
     def surfaces(self) -> dict[str, ContactForce]:
-        """Return the contacts between two surfaces by name."""
-        return {
-            one.component.joint: one for of in self.contacts.values() for one in of if one.component.name == CONTACT
-        }
+        """Return the contacts between two surfaces by name, of a polygon with all of its corners or edges."""
+        found: dict[str, list[ContactForce]] = {}
+        for each in (one for of in self.contacts.values() for one in of if one.component.name == CONTACT):
+            found.setdefault(each.component.joint, []).append(each)
+        return {name: together(parts) for name, parts in found.items()}
 
 
 def exerted(
