@@ -47,6 +47,12 @@ UNDECIDED_CONTACTS = _rejects(
     "No forces of the contacts that touch were found that obey Coulomb's law.",
     "a smaller mu",
 )
+JAMMED_JOINT = _rejects(
+    "jammed-joint",
+    Status.FAILED,
+    "No force of a joint, or several, agree with the friction that depends on it (Painleve's paradox).",
+    "a smaller mu, or another position",
+)
 TOO_MANY_EVENTS = _rejects(
     "too-many-events",
     Status.FAILED,

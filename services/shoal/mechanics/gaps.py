@@ -40,9 +40,10 @@ class Gaps(NamedTuple):
     of each in the sum that is a gap, (measures, lanes), so 1 of a lower limit and of friction, -1 of an upper limit.
     restitution, tangential: rate after an impact over the rate before, with the opposite sign (Newton), along the
     normal and of stick. mu, mu_static: coefficients of friction in slip and of the limit of stick; given: friction that
-    no normal force causes [N or N m]. The last six are (contacts, lanes). soft: RIGID, or that the force along the
-    normal is that of a law, see `press`, with five numbers in law, (5 * contacts, lanes). resolution: gaps below this
-    are closed, [m or rad].
+    no normal force causes [N or N m]; share: of dry friction in a joint, per force of the joint [1 or m]. These are
+    (contacts, lanes). held, parts: the first constraint of that joint, and how many make up its force. soft: RIGID, or
+    that the force along the normal is that of a law, see `press`, with five numbers in law, (5 * contacts, lanes).
+    resolution: gaps below this are closed, [m or rad].
     """
 
     size: int
@@ -60,6 +61,9 @@ class Gaps(NamedTuple):
     mu: Array
     mu_static: Array
     given: Array
+    share: Array
+    held: Index
+    parts: Index
     soft: Index
     law: Array
     resolution: float
@@ -75,18 +79,19 @@ class GapWork(NamedTuple):
     onward: where that leads to (`profiles.touch`). before: value, rate, force, margin and left at the beginning of a
     step, (5 * contacts, lanes). closed: whether the contact is closed, unclear: whether its force was not unique at any
     time, in a way that moves the machine, mode: whether it sticks or slips; hit: what event of it a step has ended at;
-    impulse: at the last event. force: multiplier by direction, of a closed contact along the normal not negative [N or
-    N m]; near: those of the last decision; dips: whether it, or the margin, was negative anywhere in the step. slip,
-    bias: rate of each direction, and its derivative for accelerations of zero. heading: direction of slip, of one
-    tangent its sign along it, of two in the axes of the ground as it was at the beginning of the step, (3 * contacts,
-    lanes); axes: normal and tangents, (9 * contacts, lanes). gradient, response: of each direction, and the
-    acceleration by a unit force, (directions * unknowns, lanes). none: the acceleration without forces, unit: a unit
-    force, (rows, lanes). reaction: multipliers of the constraints: without forces, by a unit force of each direction,
-    and as they are, ((directions + 2) * constraints, lanes). matrix, load, found, way, chosen: of one lane. pair:
-    `pairs.describe`. order: of the last impact, how far the impulses of contacts that strike one after the other would
-    be from those at once, (lanes,). log: time, contact, kind, impulse and `order` of each event of the first lane,
-    (RECORD * LOGGED,); number: of events, decisions: times at which contacts were decided on, alone: whether a lane of
-    a tile of several comes near an event, which it has to meet alone, (lanes,).
+    impulse: at the last event; given: friction that no normal force causes, with what joint forces allow. force:
+    multiplier by direction, of a closed contact along the normal not negative [N or N m]; near: those of the last
+    decision; dips: whether it, or the margin, was negative anywhere in the step. slip, bias: rate of each direction,
+    and its derivative for accelerations of zero. heading: direction of slip, of one tangent its sign along it, of two
+    in the axes of the ground as it was at the beginning of the step, (3 * contacts, lanes); axes: normal and tangents,
+    (9 * contacts, lanes). gradient, response: of each direction, and the acceleration by a unit force, (directions *
+    unknowns, lanes). none: the acceleration without forces, unit: a unit force, (rows, lanes). reaction: multipliers of
+    the constraints: without forces, by a unit force of each direction, and as they are, ((directions + 2) *
+    constraints, lanes). matrix, load, found, way, chosen: of one lane. pair: `pairs.describe`. order: of the last
+    impact, how far the impulses of contacts that strike one after the other would be from those at once, (lanes,). log:
+    time, contact, kind, impulse and `order` of each event of the first lane, (RECORD * LOGGED,); number: of events,
+    decisions: times at which contacts were decided on, alone: whether a lane of a tile of several comes near an event,
+    which it has to meet alone, (lanes,).
     """
 
     memory: Array
@@ -105,6 +110,7 @@ class GapWork(NamedTuple):
     mode: Array
     hit: Array
     impulse: Array
+    given: Array
     force: Array
     near: Array
     dips: Array
@@ -132,8 +138,8 @@ class GapWork(NamedTuple):
 
 LOGGED, RECORD = 4096, 5
 """So many events of the first lane are kept, of so many numbers each."""
-KEPT = 9
-"""Numbers of the state of a contact: closed, mode, speed, three of heading, and of near by normal and tangents."""
+KEPT = 11
+"""Numbers of the state of a contact: closed, mode, speed, feature, kept, three of heading, three of near."""
 
 
 def room(width: int, g: Gaps, unknowns: int, rows: int, constraints: int) -> GapWork:
@@ -150,14 +156,15 @@ def room(width: int, g: Gaps, unknowns: int, rows: int, constraints: int) -> Gap
         "pair": pairs.ROOM if g.pairs.size else 0, "order": width if n else 0, "log": RECORD * LOGGED if n else 0,
         "number": width if n else 0, "decisions": width if n else 0, "alone": width if n else 0,
     }  # fmt: skip
-    return GapWork._make([np.zeros(sizes.get(name, each)) for name in GapWork._fields])
+    work = GapWork._make([np.zeros(sizes.get(name, each)) for name in GapWork._fields])
+    return work._replace(given=np.array(g.given, dtype=float).ravel())
 
 
 def enter(gaps: Gaps, g: GapWork, kept: Array) -> None:
     """Put the state of the contacts of a single lane, (contacts, KEPT), back into its work space, see `keep`."""
-    g.closed[:], g.mode[:], g.speed[:] = kept[:, :3].T
-    g.heading[:] = kept[:, 3:6].ravel()
-    g.near[:] = kept[:, 6 : 7 + gaps.tangents].ravel()
+    g.closed[:], g.mode[:], g.speed[:], g.feature[:], g.kept[:] = kept[:, :5].T
+    g.heading[:] = kept[:, 5:8].ravel()
+    g.near[:] = kept[:, 8 : 9 + gaps.tangents].ravel()
 
 
 def shifted(gaps: Gaps, shifts: Mapping[int, float]) -> Gaps:
@@ -186,9 +193,10 @@ def keep(tile: Tile, gaps: Gaps, g: GapWork, at_event: bool, out: Array, first: 
         for contact in range(gaps.size):
             at, row = contact * width + lane, first + contact * KEPT * width + lane
             out[row], out[row + width], out[row + 2 * width] = g.closed[at], g.mode[at], g.speed[at]
+            out[row + 3 * width], out[row + 4 * width] = g.feature[at], g.kept[at]
             for k in range(3):
-                out[row + (3 + k) * width] = g.heading[(3 * contact + k) * width + lane]
-                out[row + (6 + k) * width] = g.near[(contact * ways + k) * width + lane] if k < ways else 0.0
+                out[row + (5 + k) * width] = g.heading[(3 * contact + k) * width + lane]
+                out[row + (8 + k) * width] = g.near[(contact * ways + k) * width + lane] if k < ways else 0.0
             if strikes:
                 out[row] = np.nan
 

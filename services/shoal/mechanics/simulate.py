@@ -121,7 +121,7 @@ def _begun(model: Model, scenes: list[Scene]) -> Model:
 
     The two analyses take half a second to import.
     """
-    if model.rubbing.size:
+    if model.rubbing.size or np.any(model.gaps.share):
         from shoal.mechanics.analysis.joint_reactions import require_unique_friction
 
         require_unique_friction(model)

@@ -51,6 +51,7 @@ CONTACT_TROUBLES = {
     coulomb.NO_FORCE: kinds.NO_CONTACT_FORCE,
     coulomb.SEVERAL: kinds.SEVERAL_MOTIONS,
     coulomb.UNDECIDED: kinds.UNDECIDED_CONTACTS,
+    coulomb.JAMS: kinds.JAMMED_JOINT,
     decision.TOO_MANY: kinds.TOO_MANY_EVENTS,
     impact.GAINS: kinds.IMPACT_GAINS,
 }

@@ -131,7 +131,7 @@ class Resisted(Tie):
     stick: Literal["smooth", "exact"] = "smooth"
     """Whether dry friction is smoothed, so that what should stick creeps, or sticks and slips by Coulomb's law."""
     mu: NonNegative = 0.0
-    """Coefficient of dry friction by the joint's force [1], smoothed."""
+    """Coefficient of dry friction by the joint's force [1], smoothed or exact as `stick` says."""
     stops: Stops | None = None
     """Limits of its free motion."""
     armature: NonNegative = 0.0
@@ -143,10 +143,8 @@ class Resisted(Tie):
             # A default that is stated as well is no contradiction: scenes are written with all of their fields.
             if np.any(self.coulomb_speed != type(self).model_fields["coulomb_speed"].default):
                 raise ValueError("coulomb_speed: smooths friction, and stick: exact does not; leave one of them out")
-            if np.any(self.share):
-                raise ValueError("mu: is smoothed; stick: exact is of a given friction, `coulomb`")
-            if not np.any(self.coulomb):
-                raise ValueError("stick: exact is of dry friction; state `coulomb`")
+            if not {"coulomb", "mu"} & self.model_fields_set:
+                raise ValueError("stick: exact is of dry friction; state `coulomb` or `mu`")
         return self
 
     @property
@@ -169,7 +167,7 @@ class Resisted(Tie):
 
         Without dry friction that sticks exactly, which is a contact's.
         """
-        dry = (0.0 if self.stick == "exact" else self.coulomb) + self.share * force
+        dry = 0.0 if self.stick == "exact" else self.coulomb + self.share * force
         smoothed = dry * np.tanh(rate / self.coulomb_speed)
         return np.asarray((self.friction + self.drag * np.abs(rate)) * rate + smoothed)
 

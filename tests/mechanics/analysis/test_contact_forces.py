@@ -243,3 +243,30 @@ def test_a_pin_in_a_wider_hole_and_a_gear_with_backlash_bear_what_tight_ones_do(
     one, other = (_balanced(reactions(each, [0.3])[0]) for each in (geared, tight))
     assert one.joints["mesh"].torque == pytest.approx(-2.0 * turns * 0.02, rel=1e-9)
     assert other.joints["mesh"].torque == pytest.approx(-2.0 * turns * 0.02, rel=1e-9)
+
+
+def test_a_box_on_a_slope_and_a_point_in_a_notch_bear_their_weight_at_two_places() -> None:
+    angle, weight = 0.2, 2.0 * G
+    box = [[-0.2, -0.1], [0.2, -0.1], [0.2, 0.1], [-0.2, 0.1]]
+    first = {"body": "b", "point": [0.0, 0.0], "polygon": box}
+    contact = {"first": first, "second": {"body": "ground", "line": angle}, "mu": 0.5}
+    start = {"position": [-0.1 * np.sin(angle), 0.1 * np.cos(angle)], "angle": angle}
+    scene = _scene({"b": BLOCK}, {"b": start}, contacts={"f": contact})
+    one = _balanced(reactions(scene, [0.1])[0]).contacts["f"]
+    assert one.unique  # though its corners could share friction otherwise
+    assert one.normal == pytest.approx(weight * np.cos(angle), rel=1e-9)
+    assert one.friction == pytest.approx(weight * np.sin(angle), rel=1e-9)
+    # The force passes below the centre of mass.
+    assert one.at[0] == pytest.approx(start["position"][0], abs=1e-9)
+    cell = (Channel(contact="f", quantity="normal"), Channel(contact="f", quantity="fy"))
+    seen = observe(simulate(scene, np.array([0.0, 0.1]), whole=True), cell, scene=scene)[0]
+    np.testing.assert_allclose(seen, [[weight * np.cos(angle), weight]] * 2, rtol=1e-9)
+    notch = [[1.0, 1.0], [1.0, -2.0], [-1.0, -2.0], [-1.0, 1.0], [0.0, 0.0]][::-1]
+    side = {"body": "ground", "point": [0.0, 0.0], "polygon": notch}
+    point = {"kind": "point-mass", "mass": 2.0}
+    scene = _scene(
+        {"b": point}, {"b": {"position": [0.0, 0.0]}}, contacts={"v": {"first": {"body": "b"}, "second": side}}
+    )
+    found = _balanced(reactions(scene, [0.0])[0]).contacts["v"]
+    np.testing.assert_allclose(found.force, [0.0, weight], atol=1e-9)
+    assert found.normal == pytest.approx(2.0 * weight / np.sqrt(2.0), rel=1e-9)

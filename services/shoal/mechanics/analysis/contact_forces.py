@@ -95,7 +95,7 @@ def together(parts: Sequence[ContactForce]) -> ContactForce:
 def _in_joint(motion: FreeMotion, gaps: Gaps, number: int, path: str, here: Pressing) -> ContactForce:
     """Return the force of a stop, a rope, a strut, backlash or dry friction on the second body."""
     _, name, field = path.split(".")
-    joint, rubs = motion.scene.joints[name], field == "coulomb"
+    joint, rubs = motion.scene.joints[name], field in ("coulomb", "mu")
     unit, weight = _unit(motion, name, joint, field)
     sign = float(np.sign(gaps.weight[gaps.number[number]].flat[0])) * weight
     force, none = here.force[:, 1 if rubs else 0], np.zeros(len(here.force))

@@ -274,25 +274,35 @@ def exerted(
 def _free_play(
     columns: Array, right: Array, kept: Flags, moves: list[Displacements], acting: dict[str, list[ContactForce]]
 ) -> tuple[Array, dict[str, Array]]:
-    """Return how much of the unknowns of joints, and of contacts by `joints.NAME` or `contacts.NAME`, is not unique."""
-    more = [(stated, each) for stated, of_field in acting.items() for one in of_field for each in one.open]
-    if more:
-        columns = np.concatenate([columns, np.stack([work(moves, each) for _, each in more], axis=-1)], axis=-1)
-        _, singular, right = np.linalg.svd(columns, full_matrices=False)
-        kept = singular > RANK * singular[:, :1]
-    free = np.sqrt(np.maximum(0.0, 1.0 - np.sum(np.where(kept[..., None], right, 0.0) ** 2, axis=1)))
-    count, loose = free.shape[1] - len(more), dict[str, Array]()
-    for k, (stated, each) in enumerate(more, count):
-        name, acts = ".".join(stated.split(".")[:2]), np.any(each != 0.0, axis=1)
-        loose[name] = np.maximum(loose.get(name, 0.0), np.where(acts, free[:, k], 0.0))
-    return free[:, :count], loose
+    """Return how much of the unknowns of joints is not unique, and of contacts by `joints.NAME` or `contacts.NAME`.
+
+    Of contacts that is how far their force as a whole could be different.
+    """
+    more = [
+        (".".join(path.split(".")[:2]), each) for path, parts in acting.items() for one in parts for each in one.open
+    ]
+    if not more:
+        return np.sqrt(np.maximum(0.0, 1.0 - np.sum(np.where(kept[..., None], right, 0.0) ** 2, axis=1))), {}
+    works = np.stack([work(moves, each) for _, each in more], axis=-1)
+    sizes = np.linalg.norm(works, axis=1, keepdims=True)
+    units = works / np.where(sizes > 0.0, sizes, 1.0)
+    columns = np.concatenate([columns, units], axis=-1)
+    _, singular, right = np.linalg.svd(columns, full_matrices=False)
+    held = np.where((singular > RANK * singular[:, :1])[..., None], right, 0.0)
+    open_ = np.eye(columns.shape[-1]) - np.swapaxes(held, 1, 2) @ held
+    count, loose = columns.shape[-1] - len(more), dict[str, Array]()
+    for whole in dict.fromkeys(name for name, _ in more):
+        mine = [k for k, (name, _) in enumerate(more) if name == whole]
+        net = units[:, :, mine] @ open_[:, [count + k for k in mine]]
+        loose[whole] = np.linalg.norm(net, axis=(1, 2))
+    return np.sqrt(np.maximum(0.0, np.diagonal(open_, axis1=1, axis2=2)))[:, :count], loose
 
 
 def _pressed(scene: Scene, parts: list[Component], sizes: Array) -> dict[str, Array]:
     """Return the force [N] of each joint whose friction depends on it, (samples,)."""
     found = {}
     for name, joint in scene.joints.items():
-        if isinstance(joint, Revolute | Slider) and joint.share:
+        if isinstance(joint, Revolute | Slider) and joint.share and joint.stick == "smooth":
             mine = [part.times(sizes[:, k]) for k, part in enumerate(parts) if part.joint == name and not part.turns]
             found[name] = np.linalg.norm(sum(one.force for one in mine), axis=1)
     return found
@@ -360,9 +370,10 @@ def _state(one: ContactForce) -> str:
 
 def require_unique_friction(model: Model) -> None:
     """Raises InputError where friction depends on the force of a joint that other joints may bear as well."""
-    evaluator = Evaluator(model)
+    evaluator = Evaluator(model, one_sided=True)
     sharing = _sharing(evaluator, model.q0[:, 0], 0.0)
-    for first, parts in zip(model.rubbing.first, model.rubbing.parts, strict=True):
+    firsts, counts = (*model.rubbing.first, *model.gaps.held), (*model.rubbing.parts, *model.gaps.parts)
+    for first, parts in zip(firsts, counts, strict=True):
         if np.any(sharing[first : first + parts] > SHARE):
             name = model.constraint_names[first]
             raise InputError(

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from shoal.compile import progress
 from shoal.errors import InputError
 from shoal.mechanics import fitting, functions, terms
@@ -14,6 +16,7 @@ from shoal.mechanics.assembly.masses import Masses
 from shoal.mechanics.assembly.measures import naming
 from shoal.mechanics.assembly.placement import place
 from shoal.mechanics.derived import RowAllocator
+from shoal.mechanics.gaps import DRY
 from shoal.mechanics.least import principle
 from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import index, stacked
@@ -56,11 +59,17 @@ def build(scene: Scene, lanes: int = 1, horizon: float = 0.0, placement: Placeme
     rows = RowAllocator(len(placement.positions))
     masses = Masses(scene, placement, rows)
     loads, contacts = Loads(scene, placement, rows, horizon), Contacts(scene, placement, rows)
-    gaps = contacts.gaps()
+    gaps = contacts.gaps(placement.terms.pressed)
     if gaps.size and loads.rubbing:
         raise InputError(
-            f"{contacts.fields[0]}: friction by the force of a joint (joints.{loads.rubbing[0][0]}.mu) knows "
-            "no contacts yet"
+            f"{contacts.fields[0]}: smoothed friction by the force of a joint (joints.{loads.rubbing[0][0]}.mu) knows "
+            "no contacts; state stick: exact there as well, or coulomb"
+        )
+    if np.any(gaps.share) and np.any(gaps.kind != DRY):
+        raise InputError(
+            f"{contacts.fields[int(np.argmax(gaps.kind != DRY))]}: friction by the force of a joint "
+            f"({contacts.fields[int(np.argmax(np.any(gaps.share, axis=1)))]}) knows no impacts, in which that force is "
+            "an impulse; state coulomb there"
         )
     force_rows = rows.size
     held = terms.assemble(placement.terms, rows, len(loads.fitted), span(scene))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -60,7 +60,7 @@ class Contacts(Measures):
         self._weights: list[Number] = []
         """Of the measures in the gaps."""
         self._numbers: list[tuple[Number, ...]] = []
-        """Restitution, tangential restitution, mu, mu_static and given friction of each contact."""
+        """Restitution, tangential restitution, mu, mu_static, given friction and share of each contact."""
         self._rolls: list[bool] = []
         self._laws: list[tuple[int, tuple[Number, ...]]] = []
         """Whether a contact gives way, and the numbers of its law."""
@@ -83,16 +83,17 @@ class Contacts(Measures):
         for path, contact in contacts_of(scene).items():
             self._pair(path, contact)
 
-    def gaps(self) -> Gaps:
-        """Return the contacts as arrays."""
+    def gaps(self, pressed: Mapping[str, tuple[int, int]]) -> Gaps:
+        """Return the contacts as arrays. pressed: first constraint and number of those of joints whose force counts."""
         size, rubs = len(self._each), [self._is_rough(k) for k in range(len(self._each))]
         shapes, discs, turns, rows, radii, reaches = zip(*self._pairs, strict=True) if self._pairs else ((),) * 6
         pairs = Pairs(
             self.scene.dimensions, len(self._pairs), index(shapes), index(discs),
             index(turns).ravel(), index(rows).ravel(), stacked(radii), stacked(reaches), self._profiles(),
         )  # fmt: skip
-        numbers = tuple(zip(*self._numbers, strict=True)) if size else ((),) * 5
-        restitution, tangential, mu, mu_static, given = (stacked(part) for part in numbers)
+        numbers = tuple(zip(*self._numbers, strict=True)) if size else ((),) * 6
+        restitution, tangential, mu, mu_static, given, share = (stacked(part) for part in numbers)
+        held = [pressed.get(field.split(".")[1], (0, 0)) if field.endswith(".mu") else (0, 0) for field in self.fields]
         return Gaps(
             size,
             self.scene.dimensions - 1 if any(rubs) else 0,
@@ -109,6 +110,9 @@ class Contacts(Measures):
             mu,
             mu_static,
             given,
+            share,
+            index([first for first, _ in held]),
+            index([parts for _, parts in held]),
             index([soft for soft, _ in self._laws]),
             stacked([part for _, law in self._laws for part in law]),
             RESOLUTION * float(np.max(span(self.scene))) if size else 0.0,
@@ -127,14 +131,14 @@ class Contacts(Measures):
 
     def _add(
         self, field: str, kind: int, number: int, weights: Sequence[Number] = (), *, restitution: Number = 0.0,
-        tangential: Number = 0.0, mu: Number = 0.0, mu_static: Number = 0.0, given: Number = 0.0, rolls: bool = False,
-        law: tuple[Number, ...] | None = None,
+        tangential: Number = 0.0, mu: Number = 0.0, mu_static: Number = 0.0, given: Number = 0.0, share: Number = 0.0,
+        rolls: bool = False, law: tuple[Number, ...] | None = None,
     ) -> None:  # fmt: skip
         """Add a contact. weights: of its measures, the last ones, in its gap."""
         self.fields.append(field)
         self._each.append((kind, number, number + len(weights)))
         self._weights += weights
-        self._numbers.append((restitution, tangential, mu, mu_static, given))
+        self._numbers.append((restitution, tangential, mu, mu_static, given, share))
         self._rolls.append(rolls)
         self._laws.append((RIGID, (0.0,) * LAW_SIZE) if law is None else (GIVES, law))
 
@@ -161,9 +165,10 @@ class Contacts(Measures):
                 self._limit(f"joints.{name}.stops", field, place, sign, limit, joint.stops.restitution)
 
     def _dry(self, name: str, joint: Revolute | Slider) -> None:
-        """Let a joint stick by dry friction of a given force."""
+        """Let a joint stick by dry friction of a given force, or by a part of its own."""
         self._free_motion(name, joint, 0.0)
-        self._add(f"joints.{name}.coulomb", DRY, len(self.kinds) - 1, [1.0], mu_static=1.0, given=joint.coulomb)
+        field = f"joints.{name}.{'mu' if np.any(joint.share) else 'coulomb'}"
+        self._add(field, DRY, len(self.kinds) - 1, [1.0], mu_static=1.0, given=joint.coulomb, share=joint.share)
 
     def _free_motion(self, name: str, joint: Revolute | Slider, limit: Number) -> Number:
         """Measure the free motion of a joint; returns where it is at the start [rad or m]."""

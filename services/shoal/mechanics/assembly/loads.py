@@ -74,7 +74,7 @@ class Loads(Measures):
     def _friction(self, name: str, joint: Revolute | Slider) -> None:
         smoothed = 0.0 if joint.stick == "exact" else joint.coulomb  # else a contact, see `contacts`
         law = ElementForceLaw(damping=joint.friction, coulomb=smoothed, speed=joint.coulomb_speed, drag=joint.drag)
-        if np.any(joint.share):
+        if np.any(joint.share) and joint.stick == "smooth":
             self.rubbing.append((name, len(self.kinds), joint.share))
         if isinstance(joint, Revolute):
             self._angle(name, joint.first, joint.second, law, joint.axis)

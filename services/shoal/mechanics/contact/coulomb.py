@@ -19,6 +19,8 @@ OPEN, KNOWN = 0.0, 3.0
 """Modes beside STICK and SLIP: open, and slip whose direction is known before."""
 FINE, NO_FORCE, SEVERAL, UNDECIDED = 0, 1, 2, 3
 """Outcomes: found; Painleve's paradox, no force or several; the iteration has not ended."""
+JAMS = 6
+"""Trouble beside these: friction by the force of its joint finds no force, or several (`motion`)."""
 TROUBLES = 8
 """By which outcomes are counted on: the number of the contact, times this, is added to its outcome."""
 SWEEPS = 20_000
@@ -86,14 +88,24 @@ def solve(n: int, matrix: Array, load: Array, out: Array) -> int:
 
 @njit(cache=True, error_model="numpy")
 def hold(
-    gaps: Gaps, width: int, lane: int, mode: Array, way: Array, matrix: Array, load: Array, near: Array, out: Array
+    gaps: Gaps,
+    given: Array,
+    width: int,
+    lane: int,
+    mode: Array,
+    way: Array,
+    matrix: Array,
+    load: Array,
+    near: Array,
+    out: Array,
 ) -> bool:
     """Find the forces p of contacts whose modes are known: their rates G p + c vanish but for slip.
 
     Returns whether other forces that obey the same laws would move the machine otherwise, as of contacts that bear one
     load and slip with different coefficients of friction.
 
-    mode: by contact; way: direction of slip in the tangents, by direction; load: c, of a contact that gives way its
+    given: friction that no normal force causes, by contact and lane; mode: by contact; way: direction of slip in the
+    tangents, by direction; load: c, of a contact that gives way its
     force in place of that along the normal. near: forces of the same contacts, by direction and lane: where contacts
     depend on each other p is not unique, and of all the least in the sum of its squares, each over the normal force or
     the limit of friction there, so that no contact is at its limit while others are not.
@@ -105,7 +117,7 @@ def hold(
         if mode[row // ways] != OPEN:
             each[n], n = row, n + 1
     equations, right, found = np.zeros(n * n), np.zeros(n), np.zeros(n)
-    _state(gaps, width, lane, mode, way, matrix, load, n, each, equations, right)
+    _state(gaps, given, width, lane, mode, way, matrix, load, n, each, equations, right)
     unclear = False
     if solve(n, equations, right, found) < n:
         other = found.copy()
@@ -113,9 +125,9 @@ def hold(
         for i in range(n):
             contact, k = each[i] // ways, each[i] % ways
             normal = abs(near[contact * ways * width + lane])
-            most = limit(gaps, contact, width, lane, normal, True) if k > 0 else normal
+            most = limit(gaps, given, contact, width, lane, normal, True) if k > 0 else normal
             scale[i] = most if most < np.inf else normal
-        _state(gaps, width, lane, mode, way, matrix, load, n, each, equations, right)
+        _state(gaps, given, width, lane, mode, way, matrix, load, n, each, equations, right)
         for i in range(n):
             rest[i] = right[i]
             for j in range(n):
@@ -147,8 +159,8 @@ def hold(
 
 @njit(cache=True, error_model="numpy")
 def _state(
-    gaps: Gaps, width: int, lane: int, mode: Array, way: Array, matrix: Array, load: Array, n: int, each: Index,
-    equations: Array, right: Array,
+    gaps: Gaps, given: Array, width: int, lane: int, mode: Array, way: Array, matrix: Array, load: Array, n: int,
+    each: Index, equations: Array, right: Array,
 ) -> None:  # fmt: skip
     """State the equations of the n directions in `each`, those of the contacts that are not open."""
     ways = 1 + gaps.tangents
@@ -163,7 +175,7 @@ def _state(
             # p_T = -(mu p_N + given) u
             equations[i * n + i] = 1.0
             equations[i * n + i - k] = gaps.mu[at] * way[row]
-            right[i] = -gaps.given[at] * way[row]
+            right[i] = -given[at] * way[row]
         elif is_unknown(gaps, contact, k, mode[contact]):
             for j in range(n):
                 equations[i * n + j] = matrix[row * size + each[j]]
@@ -186,7 +198,16 @@ def is_unknown(gaps: Gaps, contact: int, k: int, mode: float) -> bool:
 
 @njit(cache=True, error_model="numpy")
 def decide(
-    gaps: Gaps, width: int, lane: int, mode: Array, way: Array, matrix: Array, load: Array, out: Array, impulsive: bool
+    gaps: Gaps,
+    given: Array,
+    width: int,
+    lane: int,
+    mode: Array,
+    way: Array,
+    matrix: Array,
+    load: Array,
+    out: Array,
+    impulsive: bool,
 ) -> int:
     """Find modes and forces of contacts at once; returns the outcome.
 
@@ -216,7 +237,7 @@ def decide(
                         rest[row] += matrix[row * n + j] * out[j]
             if gaps.soft[contact] != RIGID:
                 rest[first] = load[first]
-            found = alone(gaps, contact, width, lane, asked[contact], mode, way, matrix, rest, out, impulsive)
+            found = alone(gaps, given, contact, width, lane, asked[contact], mode, way, matrix, rest, out, impulsive)
             if found > outcome % TROUBLES:
                 outcome = found + TROUBLES * contact
             for row in range(first, first + ways):
@@ -240,20 +261,20 @@ def decide(
     near = np.zeros(n * width)
     for i in range(n):
         near[i * width + lane] = out[i]
-    hold(gaps, width, lane, mode, way, matrix, load, near, begun)
-    if _agrees(gaps, width, lane, mode, begun):
+    hold(gaps, given, width, lane, mode, way, matrix, load, near, begun)
+    if _agrees(gaps, given, width, lane, mode, begun):
         for i in range(n):
             out[i] = begun[i]
         if not impulsive:
-            _let_share(gaps, width, lane, asked, mode, way, matrix, load, near, out)
+            _let_share(gaps, given, width, lane, asked, mode, way, matrix, load, near, out)
         return FINE
     return FINE if change <= 1e-9 * largest else UNDECIDED
 
 
 @njit(cache=True, error_model="numpy")
 def _let_share(
-    gaps: Gaps, width: int, lane: int, asked: Array, mode: Array, way: Array, matrix: Array, load: Array, near: Array,
-    out: Array,
+    gaps: Gaps, given: Array, width: int, lane: int, asked: Array, mode: Array, way: Array, matrix: Array, load: Array,
+    near: Array, out: Array,
 ) -> None:  # fmt: skip
     """Let contacts that others spare, but that would press as well, bear their share: of two at one place each half."""
     ways = 1 + gaps.tangents
@@ -274,8 +295,8 @@ def _let_share(
             some = True
     if not some:
         return
-    hold(gaps, width, lane, modes, way, matrix, load, near, forces)
-    agrees = _agrees(gaps, width, lane, modes, forces)
+    hold(gaps, given, width, lane, modes, way, matrix, load, near, forces)
+    agrees = _agrees(gaps, given, width, lane, modes, forces)
     for contact in range(gaps.size):
         agrees = agrees and (modes[contact] == mode[contact] or forces[contact * ways] > UNCLEAR * most)
     if agrees:
@@ -286,7 +307,7 @@ def _let_share(
 
 
 @njit(cache=True, error_model="numpy")
-def _agrees(gaps: Gaps, width: int, lane: int, mode: Array, p: Array) -> bool:
+def _agrees(gaps: Gaps, given: Array, width: int, lane: int, mode: Array, p: Array) -> bool:
     """Return whether forces of contacts with these modes keep the limits of friction."""
     ways = 1 + gaps.tangents
     for contact in range(gaps.size):
@@ -295,23 +316,24 @@ def _agrees(gaps: Gaps, width: int, lane: int, mode: Array, p: Array) -> bool:
             return False
         for k in range(1, ways):
             square += p[first + k] ** 2
-        if mode[contact] == STICK and np.sqrt(square) > limit(gaps, contact, width, lane, p[first], True):
+        if mode[contact] == STICK and np.sqrt(square) > limit(gaps, given, contact, width, lane, p[first], True):
             return False
     return True
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def limit(gaps: Gaps, contact: int, width: int, lane: int, normal: float, static: bool) -> float:
+def limit(gaps: Gaps, given: Array, contact: int, width: int, lane: int, normal: float, static: bool) -> float:
     """Return the limit of friction under a normal force [N]."""
     at = contact * width + lane
     if gaps.rolls[contact] > 0:
         return np.inf
-    return (gaps.mu_static[at] if static else gaps.mu[at]) * normal + gaps.given[at]  # type: ignore[no-any-return]
+    return (gaps.mu_static[at] if static else gaps.mu[at]) * normal + given[at]  # type: ignore[no-any-return]
 
 
 @njit(cache=True, error_model="numpy")
 def alone(
-    gaps: Gaps, contact: int, width: int, lane: int, asked: float, mode: Array, way: Array, matrix: Array, rest: Array,
+    gaps: Gaps, given: Array, contact: int, width: int, lane: int, asked: float, mode: Array, way: Array, matrix: Array,
+    rest: Array,
     out: Array, impulsive: bool,
 ) -> int:  # fmt: skip
     """Decide one contact exactly, with the rates that the others leave; returns the outcome."""
@@ -320,21 +342,18 @@ def alone(
     for k in range(ways):
         out[first + k] = 0.0
     if gaps.kind[contact] == DRY:
-        if impulsive:
-            mode[contact] = STICK
-            return FINE
-        row, given = first + 1, gaps.given[at]
+        row, most = first + 1, given[at]
         if asked != KNOWN:
-            push = -rest[row] / matrix[row * n + row]
+            own = matrix[row * n + row]
             mode[contact] = STICK
-            if abs(push) <= given:
-                out[row] = push
+            if abs(rest[row]) <= most * own:
+                out[row] = -rest[row] / own if own > 0.0 else 0.0
                 return FINE
-            mode[contact], way[row] = SLIP, -np.sign(push)
-        out[row] = -given * way[row]
+            mode[contact], way[row] = SLIP, np.sign(rest[row])
+        out[row] = -most * way[row]
         return FINE
     if gaps.soft[contact] != RIGID:
-        _under(gaps, contact, width, lane, asked, mode, way, matrix, rest, out)
+        _under(gaps, given, contact, width, lane, asked, mode, way, matrix, rest, out)
         return FINE
     normal, own = rest[first], matrix[first * n + first]
     mode[contact] = KNOWN if asked == KNOWN else STICK
@@ -363,7 +382,7 @@ def alone(
             block[i * ways + j] = matrix[(first + i) * n + first + j]
     solve(ways, block, right, push)
     tangential = np.sqrt(np.sum(push[1:] ** 2))
-    within = push[0] >= 0.0 and tangential <= limit(gaps, contact, width, lane, push[0], True)
+    within = push[0] >= 0.0 and tangential <= limit(gaps, given, contact, width, lane, push[0], True)
     if within and _vanish(ways, n, first, matrix, rest, push):
         for k in range(ways):
             out[first + k] = push[k]
@@ -390,7 +409,8 @@ def _vanish(ways: int, n: int, first: int, matrix: Array, rest: Array, push: Arr
 
 @njit(cache=True, error_model="numpy")
 def _under(
-    gaps: Gaps, contact: int, width: int, lane: int, asked: float, mode: Array, way: Array, matrix: Array, rest: Array,
+    gaps: Gaps, given: Array, contact: int, width: int, lane: int, asked: float, mode: Array, way: Array, matrix: Array,
+    rest: Array,
     out: Array,
 ) -> None:  # fmt: skip
     """Let a contact stick or slip under a normal force that is known."""
@@ -408,7 +428,7 @@ def _under(
                 block[i * ways + j] = matrix[(first + i) * n + first + j]
         solve(ways, block, right, push)
         size = np.sqrt(np.sum(push[1:] ** 2))
-        if size <= limit(gaps, contact, width, lane, max(normal, 0.0), True):
+        if size <= limit(gaps, given, contact, width, lane, max(normal, 0.0), True):
             for k in range(1, ways):
                 out[first + k] = push[k]
             return

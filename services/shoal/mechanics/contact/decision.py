@@ -11,13 +11,14 @@ from numba import njit
 
 from shoal.compile import function_pointers
 from shoal.mechanics.contact import complementarity, coulomb, impact, motion, response
-from shoal.mechanics.contact.coulomb import FINE, KNOWN, OPEN, TROUBLES
+from shoal.mechanics.contact.coulomb import FINE, JAMS, KNOWN, OPEN, TROUBLES
 from shoal.mechanics.contact.impact import APART, SEPARATES, STILL, TOUCHES
 from shoal.mechanics.dynamics import ACCELERATION, Work
 from shoal.mechanics.gaps import DRY, HIT, LIFT, LOGGED, PASS, RECORD, RIGID, SLIDE, SLIP, STICK, STOP, press
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics.tile import Array, Flags, Tile
 from shoal.mechanics.profiles import CORNER
+from shoal.mechanics.rubbing import ROUNDS, SETTLED
 
 MEET = 4.0
 """Event beside those of `gaps`: a contact that gives way is met."""
@@ -255,7 +256,7 @@ def _choose(tile: Tile, m: Arrays, w: Work, t: float, lane: int, state: Array) -
     if m.gaps.tangents == 0 and not m.gives:
         complementarity.complementary(size, g.matrix, g.load, g.chosen, g.found)
         return FINE
-    outcome = coulomb.decide(m.gaps, width, lane, g.chosen, g.way, g.matrix, g.load, g.found, False)
+    outcome = _decide(m, w, width, lane)
     if _leads_on(tile, m, w, lane):
         return outcome  # type: ignore[no-any-return]
     # One whose friction has reached its limit may stick on if others take more of what they hold together.
@@ -272,7 +273,27 @@ def _ask_again(tile: Tile, m: Arrays, w: Work, lane: int, state: Array, slides: 
         g.chosen[contact] = _asked(tile, m, w, lane, contact, state)
         if g.hit[contact * width + lane] == SLIDE and g.chosen[contact] == KNOWN:
             g.chosen[contact] = slides
-    return coulomb.decide(m.gaps, width, lane, g.chosen, g.way, g.matrix, g.load, g.found, False)  # type: ignore[no-any-return]
+    return _decide(m, w, width, lane)  # type: ignore[no-any-return]
+
+
+@njit(cache=True, error_model="numpy")
+def _decide(m: Arrays, w: Work, width: int, lane: int) -> int:
+    """Decide modes as w.gaps.chosen asks, with the friction that the forces of joints allow; returns the outcome."""
+    g, asked = w.gaps, np.zeros(m.gaps.size)
+    for contact in range(m.gaps.size):
+        asked[contact] = g.chosen[contact]
+    for _ in range(ROUNDS):
+        for contact in range(m.gaps.size):
+            g.chosen[contact] = asked[contact]
+        outcome = coulomb.decide(m.gaps, g.given, width, lane, g.chosen, g.way, g.matrix, g.load, g.found, False)
+        if outcome != FINE or response.allow(m, w, width, lane) <= SETTLED:
+            return outcome  # type: ignore[no-any-return]
+    jammed = FINE
+    for contact in range(m.gaps.size - 1, -1, -1):
+        at = contact * width + lane
+        g.given[at] = m.gaps.given[at]
+        jammed = JAMS + TROUBLES * contact if m.gaps.share[at] > 0.0 else jammed
+    return jammed
 
 
 @njit(cache=True, error_model="numpy")
@@ -299,7 +320,7 @@ def _has_room(tile: Tile, m: Arrays, w: Work, lane: int) -> bool:
             square, first = 0.0, contact * ways
             for row in range(first + 1, first + ways):
                 square += g.found[row] ** 2
-            limit = coulomb.limit(m.gaps, contact, width, lane, g.found[first], True)
+            limit = coulomb.limit(m.gaps, g.given, contact, width, lane, g.found[first], True)
             room = room and g.chosen[contact] == STICK and np.sqrt(square) < (1.0 - MARGIN) * limit
     return room
 
@@ -350,6 +371,9 @@ def _asked(tile: Tile, m: Arrays, w: Work, lane: int, contact: int, state: Array
     for k in range(ways):
         push = max(push, abs(g.load[contact * ways + k]))
         square += g.slip[(contact * ways + k) * width + lane] ** 2 if k > 0 else 0.0
+    if m.gaps.kind[contact] == DRY:
+        row = contact * ways + 1
+        push += g.matrix[row * m.gaps.size * ways + row] * g.given[at]
     speed = np.sqrt(square)
     if g.hit[at] == SLIDE:
         response.along_heading(m, w, contact, width, lane)

@@ -52,8 +52,10 @@ def strike(tile: Tile, m: Arrays, w: Work, lane: int, state: Array, plastic: Arr
         some = turn == 0
         for contact in range(size):
             at, first = contact * width + lane, contact * ways
-            member = state[at] != APART and rates[first] <= still and m.gaps.soft[contact] == RIGID
-            some = some or (member and m.gaps.kind[contact] != DRY and rates[first] < -still)
+            # Dry friction of a joint has no impulse, as its force is given.
+            rigid = m.gaps.kind[contact] != DRY and m.gaps.soft[contact] == RIGID
+            member = rigid and state[at] != APART and rates[first] <= still
+            some = some or (member and rates[first] < -still)
             g.chosen[contact] = STICK if member else OPEN
             for k in range(ways):
                 g.load[first + k] = _asked(m, width, lane, contact, k, plastic, rates) if member else 0.0
@@ -62,7 +64,7 @@ def strike(tile: Tile, m: Arrays, w: Work, lane: int, state: Array, plastic: Arr
         if m.gaps.tangents == 0 and not m.gives:
             complementarity.complementary(size, g.matrix, g.load, g.chosen, g.found)
         else:
-            outcome = coulomb.decide(m.gaps, width, lane, g.chosen, g.way, g.matrix, g.load, g.found, True)
+            outcome = coulomb.decide(m.gaps, g.given, width, lane, g.chosen, g.way, g.matrix, g.load, g.found, True)
         if outcome == FINE and _gains(m, w, rates):
             outcome = GAINS + TROUBLES * struck(size, width, lane, g.hit)
         if outcome != FINE:
@@ -117,7 +119,7 @@ def _one_by_one(
         first = hits * ways
         for k in range(ways):
             rest[first + k] = _asked(m, width, lane, hits, k, plastic, rates)
-        if coulomb.alone(m.gaps, hits, width, lane, STICK, mode, way, g.matrix, rest, each, True) != FINE:
+        if coulomb.alone(m.gaps, g.given, hits, width, lane, STICK, mode, way, g.matrix, rest, each, True) != FINE:
             break
         for k in range(ways):
             left[first + k] -= each[first + k]

@@ -14,6 +14,7 @@ from shoal.mechanics.dynamics import Work
 from shoal.mechanics.gaps import DRY, RIGID, SLIP, STICK, press
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics.tile import Array, Tile
+from shoal.mechanics.rubbing import LOST, ROUNDS, SETTLED
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -37,10 +38,27 @@ def _hold(tile: Tile, m: Arrays, w: Work, lane: int) -> None:
             g.load[contact * (1 + m.gaps.tangents)] = press(m.gaps, g, contact, width, lane)[0]
     if m.gaps.tangents == 0 and not m.gives:
         complementarity.solve(size, g.matrix, g.load, mode, g.found)
-    elif coulomb.hold(m.gaps, width, lane, mode, g.way, g.matrix, g.load, g.near, g.found):
-        for contact in range(size):
-            if mode[contact] != 0.0:
-                g.unclear[contact * width + lane] = 1.0
+        return
+    unclear, change = False, np.inf
+    for _ in range(ROUNDS):
+        unclear = coulomb.hold(m.gaps, g.given, width, lane, mode, g.way, g.matrix, g.load, g.near, g.found)
+        change = response.allow(m, w, width, lane)
+        if change <= SETTLED:
+            break
+    if not change <= LOST:
+        _jam(m, w, width, lane, mode)
+    for contact in range(size):
+        if unclear and mode[contact] != 0.0:
+            g.unclear[contact * width + lane] = 1.0
+
+
+@njit(cache=True, error_model="numpy")
+def _jam(m: Arrays, w: Work, width: int, lane: int, mode: Array) -> None:
+    """Leave no forces where friction and the joint forces that it depends on find none that agree."""
+    for contact in range(m.gaps.size - 1, -1, -1):
+        if mode[contact] == SLIP and m.gaps.share[contact * width + lane] > 0.0:
+            w.gaps.found[contact * (1 + m.gaps.tangents) + 1] = np.nan
+            w.gauss.ended[2 * width + lane] = coulomb.JAMS + coulomb.TROUBLES * contact
 
 
 @njit(cache=True, error_model="numpy")
@@ -86,7 +104,7 @@ def _rub(tile: Tile, m: Arrays, w: Work, lane: int) -> None:
             if g.mode[at] == SLIP:
                 w.power[lane] -= g.found[first + k] * g.slip[(first + k) * width + lane]
         if g.mode[at] == STICK:
-            limit = coulomb.limit(m.gaps, contact, width, lane, g.found[first], True)
+            limit = coulomb.limit(m.gaps, g.given, contact, width, lane, g.found[first], True)
             g.margin[at] = limit - np.sqrt(square)
 
 

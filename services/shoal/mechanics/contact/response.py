@@ -128,6 +128,32 @@ def after(tile: Tile, m: Arrays, w: Work, direction: int) -> float:
 
 
 @njit(cache=True, error_model="numpy")
+def allow(m: Arrays, w: Work, width: int, lane: int) -> float:
+    """Find the friction that the forces of joints allow, with the forces of contacts in w.gaps.found.
+
+    Returns its change over the largest, 0 where none depends on them. The multipliers are those without contacts. Of
+    one joint that slips, f = mu |N0 + f N1| has one solution where mu |N1| < 1, which this iteration finds; else it has
+    none or two, and the iteration diverges.
+    """
+    g, c, ways, change, largest = w.gaps, m.constraints.size, 1 + m.gaps.tangents, 0.0, 0.0
+    for contact in range(m.gaps.size):
+        at, square = contact * width + lane, 0.0
+        if m.gaps.share[at] == 0.0:
+            continue
+        for k in range(m.gaps.held[contact], m.gaps.held[contact] + m.gaps.parts[contact]):
+            force = w.gauss.multiplier[k * width + lane]
+            for direction in range(m.gaps.size * ways):
+                if g.found[direction] != 0.0:
+                    force += g.found[direction] * g.reaction[((direction + 1) * c + k) * width + lane]
+            square += force * force
+        last, g.given[at] = g.given[at], m.gaps.given[at] + m.gaps.share[at] * np.sqrt(square)
+        if not np.isfinite(g.given[at]):
+            return np.inf
+        change, largest = max(change, abs(g.given[at] - last)), max(largest, g.given[at])
+    return change / largest if largest > 0.0 else change
+
+
+@njit(cache=True, error_model="numpy")
 def tangent_of(m: Arrays, w: Work, contact: int, width: int, lane: int) -> None:
     """The direction of slip of a contact, by its tangents, into w.gaps.way.
 
