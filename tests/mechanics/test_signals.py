@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from shoal.errors import InputError
+from shoal.errors import InputError, UnstableStepError
 from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.analysis.modes import modes
 from shoal.mechanics.analysis.reactions import reactions
@@ -143,6 +143,36 @@ def stribeck() -> dict[str, Any]:
         "markers": {"mass": {"body": "mass"}},
         "initial": {"mass": {"position": [0.02, 0]}},
         "solver": {**FINE, "integrator": "dop853"},
+    }  # fmt: skip
+
+
+AXIS = [1.0, 2.0, -0.5]
+POST = {
+    "kind": "spring", "first": {"body": "arm", "point": "end"}, "second": {"body": "bead"}, "length": 0.2,
+    "stiffness": 50, "damping": 2,
+}  # fmt: skip
+
+
+def in_space(**loads: Any) -> dict[str, Any]:
+    """A bead on a rod that turns about an oblique axis, with a torque about it and a force that turns with the rod."""
+    turn = {"kind": "torque", "at": {"body": "arm"}, "axis": AXIS, "torque": "8*(0.3 - angle(hinge)) - 0.5*rate(hinge)"}
+    push = {"kind": "force", "at": {"body": "arm", "point": "end"}, "force": [0, 1, 2], "follows": True}
+    return {
+        "name": "space",
+        "dimensions": 3,
+        "gravity": [0, 0, -9.81],
+        "bodies": {"arm": rod(0.8, 2.0), "bead": {"kind": "point-mass", "mass": 0.3}},
+        "joints": {
+            "hinge": {"first": ground(0, 0, 0), "second": {"body": "arm"}, "axis": AXIS},
+            "rail": {"kind": "slider", "first": {"body": "arm"}, "second": {"body": "bead"}, "axis": [1, 0, 0]},
+        },
+        "loads": loads or {
+            "turn": turn,
+            "push": {**push, "scale": "distance(bead, tip) - velocity(bead, z)*slide(rail) + 0.1*slide_rate(rail)"},
+        },
+        "markers": {"tip": {"body": "arm", "point": "end"}, "bead": {"body": "bead"}},
+        "initial": {"arm": {"rotation": [0.1, 0.0, 0.0]}, "bead": {"position": [0.3, 0.0, 0.0]}},
+        "solver": {**FINE, "duration": 1.0, "integrator": "dop853"},
     }  # fmt: skip
 
 
@@ -304,6 +334,45 @@ def test_fixed_steps_keep_their_order(integrator: str, order: int) -> None:
     assert math.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.3)
 
 
+@pytest.mark.parametrize("make", [cart_pole, two_link, saturated, filtered, in_space])
+def test_implicit_integrators_follow_signals(make: Any) -> None:
+    """Newton's method takes their exact derivatives: where all is linear, one change and one to see that it was all."""
+    times, data = np.array([0.2, 0.5]), make()
+    exact = simulate(Scene.parse(data), times)
+    solver = {"duration": 0.5, "relative_tolerance": 1e-9, "absolute_tolerance": 1e-9}
+    radau = simulate(Scene.parse({**data, "solver": {**solver, "integrator": "radau5"}}), times)
+    assert radau.ok
+    assert radau.points == pytest.approx(exact.points, abs=1e-7)
+    errors = []
+    for step in (2e-3, 1e-3):
+        alpha = Scene.parse({**data, "solver": {**solver, "integrator": "generalized-alpha", "step": step}})
+        found = simulate(alpha, times)
+        errors.append(float(np.max(np.abs(found.points - exact.points))))
+        assert found.model["evaluations"] <= (2 if make is filtered else 4) * found.steps
+    assert math.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.5 if make is saturated else 0.3)  # a kink
+
+
+def test_feedback_much_faster_than_the_step() -> None:
+    """Of a controller with a million times the gains, and a filter of a microsecond, nothing is left but its aim."""
+    data = on_rail(
+        1.0,
+        0.0,
+        "1e8*(wanted - slide(rail)) + 2e4*(wanted_rate - slide_rate(rail))",
+        signals={"wanted": "0.1*sin(3*t)", "wanted_rate": "0.3*cos(3*t) + lag - lag_now", "lag_now": "sin(2*t)"},
+        states={"lag": {"rate": "1e6*(sin(2*t) - lag)"}},
+    )
+    data["initial"] = {"mass": {"position": [0.0, 0.0], "velocity": [0.3, 0.0]}}
+    for integrator in ("radau5", "generalized-alpha", "auto"):
+        data["solver"] = {"integrator": integrator, "duration": 1.0, "step": 1e-2}
+        found = simulate(Scene.parse(data), np.array([0.5, 1.0]))
+        assert found.ok
+        assert found.points[:, 0, 0, 0] == pytest.approx(0.1 * np.sin([1.5, 3.0]), abs=1e-5)
+        assert found.steps < 500
+    assert found.model["integrator"] == "radau5"
+    with pytest.raises(UnstableStepError, match=r"solver.step: 0.01 s is beyond the stability limit"):
+        simulate(Scene.parse({**data, "solver": {"integrator": "rk4", "step": 1e-2}}), np.array([1.0]))
+
+
 def test_a_spring_that_is_stated_as_a_signal_is_that_spring() -> None:
     """Whole turns of an angle are counted, and distances are those of markers."""
     stated, turned = pendulum("3*(20 - angle(hinge))"), pendulum("0*t")
@@ -313,36 +382,6 @@ def test_a_spring_that_is_stated_as_a_signal_is_that_spring() -> None:
     one, other = (simulate(Scene.parse(each), times) for each in (stated, turned))
     assert np.max(one.angles) > 2 * math.pi
     assert one.points == pytest.approx(other.points, abs=1e-8)
-
-
-AXIS = [1.0, 2.0, -0.5]
-POST = {
-    "kind": "spring", "first": {"body": "arm", "point": "end"}, "second": {"body": "bead"}, "length": 0.2,
-    "stiffness": 50, "damping": 2,
-}  # fmt: skip
-
-
-def in_space(**loads: Any) -> dict[str, Any]:
-    """A bead on a rod that turns about an oblique axis, with a torque about it and a force that turns with the rod."""
-    turn = {"kind": "torque", "at": {"body": "arm"}, "axis": AXIS, "torque": "8*(0.3 - angle(hinge)) - 0.5*rate(hinge)"}
-    push = {"kind": "force", "at": {"body": "arm", "point": "end"}, "force": [0, 1, 2], "follows": True}
-    return {
-        "name": "space",
-        "dimensions": 3,
-        "gravity": [0, 0, -9.81],
-        "bodies": {"arm": rod(0.8, 2.0), "bead": {"kind": "point-mass", "mass": 0.3}},
-        "joints": {
-            "hinge": {"first": ground(0, 0, 0), "second": {"body": "arm"}, "axis": AXIS},
-            "rail": {"kind": "slider", "first": {"body": "arm"}, "second": {"body": "bead"}, "axis": [1, 0, 0]},
-        },
-        "loads": loads or {
-            "turn": turn,
-            "push": {**push, "scale": "distance(bead, tip) - velocity(bead, z)*slide(rail) + 0.1*slide_rate(rail)"},
-        },
-        "markers": {"tip": {"body": "arm", "point": "end"}, "bead": {"body": "bead"}},
-        "initial": {"arm": {"rotation": [0.1, 0.0, 0.0]}, "bead": {"position": [0.3, 0.0, 0.0]}},
-        "solver": {**FINE, "duration": 1.0, "integrator": "dop853"},
-    }  # fmt: skip
 
 
 def test_a_hinge_in_space_with_a_motor_is_one_with_a_spring_and_a_damper() -> None:
@@ -470,11 +509,9 @@ def test_derivatives_of_loads_that_follow_signals(dimensions: int) -> None:
 
 def test_what_knows_no_signals_says_so() -> None:
     scene = Scene.parse(pendulum())
-    with pytest.raises(InputError, match=r"loads.motor.torque: follows signals"):
+    with pytest.raises(InputError, match=r"loads.motor.torque: signals and states are known in motions"):
         reactions(scene)
-    with pytest.raises(InputError, match=r"states.integral: motions know states, but not yet equilibria"):
+    with pytest.raises(InputError, match=r"states.integral: equilibria and modes know no states"):
         statics(Scene.parse(saturated()))
     with pytest.raises(InputError, match=r"loads.motor.torque: steady motions take no signals"):
         modes(scene.with_values({"initial.arm.rate": 1.0}))
-    with pytest.raises(InputError, match=r"solver.integrator: radau5 knows no signals, as of loads.motor.torque"):
-        simulate(scene.with_values({"solver.integrator": "radau5"}), np.array([0.1]))

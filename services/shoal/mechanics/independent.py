@@ -29,7 +29,7 @@ def independent_rows(c: Constraints, derived: Derived, q: Array) -> Index | None
 
     None where a dependence is not seen to be one of the machine: it is at a singular position, or cannot move.
     """
-    first, gap = _linearised(c, derived, q)
+    first, gap = linearised(c, derived, q)
     rank, left, free = _rank(first)
     if rank == c.size:
         return np.arange(c.size)
@@ -42,7 +42,7 @@ def independent_rows(c: Constraints, derived: Derived, q: Array) -> Index | None
         aside = _closed(c, derived, q + way, gap)
         if aside is None:
             return None
-        other, left, _ = _rank(_linearised(c, derived, aside)[0])
+        other, left, _ = _rank(linearised(c, derived, aside)[0])
         if other != rank:
             return None
         shares.append(left)
@@ -71,19 +71,19 @@ def _rank(slope: Array) -> tuple[int, Array, Array]:
 
 def _closed(c: Constraints, derived: Derived, q: Array, gap: Array) -> Array | None:
     """Return coordinates near q at which the constraints are as at the start; None if they do not close."""
-    begin = np.max(np.abs(_linearised(c, derived, q)[1] - gap))
+    begin = np.max(np.abs(linearised(c, derived, q)[1] - gap))
 
     def correct(q: Array) -> tuple[Array, float]:
-        slope, now = _linearised(c, derived, q)
+        slope, now = linearised(c, derived, q)
         back = np.asarray(np.linalg.lstsq(slope, gap - now, DEPENDENT)[0], dtype=float)
         return back, float(np.max(np.abs(back)))
 
     found, *_ = newton(correct, q, close=1e-14)
-    left = np.max(np.abs(_linearised(c, derived, found)[1] - gap))
+    left = np.max(np.abs(linearised(c, derived, found)[1] - gap))
     return found if left <= CLOSED * max(begin, 1.0) else None
 
 
-def _linearised(c: Constraints, derived: Derived, q: Array) -> tuple[Array, Array]:
+def linearised(c: Constraints, derived: Derived, q: Array) -> tuple[Array, Array]:
     """Return C_q (rows, unknowns) and C without drives (rows,) of the first lane."""
     of_row = np.repeat(np.arange(len(derived.constant)), np.diff(derived.start))
     parts = np.bincount(of_row, derived.coefficient[:, 0] * q[derived.source], len(derived.constant))

@@ -89,7 +89,7 @@ class Machine:
 
 def step_limit(model: Model, integrator: Facts) -> float:
     """`stability.step_limit`, which takes a second to import, where anything can limit a step."""
-    if not (model.elastic or model.forces.size):
+    if not (model.elastic or model.forces.size or model.signals):
         return np.inf
     from shoal.mechanics import stability
 

@@ -25,8 +25,9 @@ from shoal.mechanics.derived import fold
 from shoal.mechanics.forces import Forces
 from shoal.mechanics.numerics.tile import Array, Index, Tile
 
-ACT, REMEMBER, LINEARISE = range(3)
-"""What the kernel does: evaluate all and add the loads to the forces, count the turns of angles, or see `linearise`."""
+ACT, REMEMBER, LINEARISE, DERIVE = range(4)
+"""What the kernel does: evaluate all and add the loads to the forces; count the turns of angles; evaluate all and
+`linearise`; or `linearise` what was evaluated last."""
 FORCE, BY_PLACE, BY_RATE = range(3)
 """What `linearise` makes of every strength."""
 BLOCKS = 3
@@ -133,6 +134,13 @@ def act(tile: Tile, s: Signals, register: Array, z: Array, zdot: Array, f: Array
             add_product(tile, f, s.torques.rows[rows * k + row], room, value, room, rows + row)
 
 
+@njit(cache=True, error_model="numpy", forceinline=True)
+def block(tile: Tile, s: Signals, m: Any, w: Any, k: int) -> Array:
+    """Return where `linearise` puts what belongs to strength k, BLOCKS times `force_rows` rows."""
+    rows = s.measures.size + 2 * (s.first + s.size) + 1 + BLOCKS * k * m.force_rows
+    return shift(w.signals, rows * len(tile))  # type: ignore[no-any-return]
+
+
 @njit(cache=True, error_model="numpy")
 def linearise(tile: Tile, s: Signals, m: Any, w: Any, z: Array, zdot: Array) -> None:
     """Find of every strength S, evaluated before, the force on the unknowns if it is 1, dS/dq and dS/dv.
@@ -144,7 +152,7 @@ def linearise(tile: Tile, s: Signals, m: Any, w: Any, z: Array, zdot: Array) -> 
     adjoint, power = shift(register, count * width), shift(register, 2 * count * width)
     value, rows = forces.value_row(s.measures), forces.side(s.measures)
     for k in range(s.strengths):
-        force = shift(register, (2 * count + 1) * width + BLOCKS * k * end)
+        force = block(tile, s, m, w, k)
         by_place, by_rate = shift(force, end), shift(force, 2 * end)
         for i in range(BLOCKS * end):
             force[i] = 0.0
@@ -175,8 +183,9 @@ def _signals(tile, s, m, w, t, z, zdot, f, part):  # type: ignore[no-untyped-def
     if part == REMEMBER:
         forces.remember(tile, s.measures, z, w.signals)
         return
-    evaluate(tile, s, m, w, t, z, zdot)
-    if part == LINEARISE:
+    if part != DERIVE:
+        evaluate(tile, s, m, w, t, z, zdot)
+    if part in (LINEARISE, DERIVE):
         linearise(tile, s, m, w, z, zdot)
     else:
         act(tile, s, _registers(tile, s, w.signals), z, zdot, f, w.power, w.element)

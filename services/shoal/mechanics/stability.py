@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from shoal.mechanics.closed_loop import poles
 from shoal.mechanics.dynamics import work_space
 from shoal.mechanics.integrators.scheme import Facts
 from shoal.mechanics.model import Model
@@ -44,7 +45,19 @@ def step_limit(model: Model, facts: Facts) -> float:
         return np.inf
     frequency, decay = highest_frequency(model), highest_damping_rate(model)
     oscillation = facts.stable_step_times_frequency / frequency if frequency > 0 else np.inf
-    return min(oscillation, facts.stable_step_times_decay / decay if decay > 0 else np.inf)
+    passive = min(oscillation, facts.stable_step_times_decay / decay if decay > 0 else np.inf)
+    return min(passive, _closed_loop(model, facts)) if model.signals and model.unknowns <= _DENSE else passive
+
+
+def _closed_loop(model: Model, facts: Facts) -> float:
+    """Largest stable step [s] for the poles of the machine with its feedback, in the first lane.
+
+    Regions of stability are about ellipses with half axes along the frequencies and the rates of decay.
+    """
+    found = poles(model)
+    decay = np.minimum(found.real, 0.0) / facts.stable_step_times_decay
+    fastest = np.max(np.hypot(decay, found.imag / facts.stable_step_times_frequency), initial=0.0)
+    return float(1.0 / fastest) if fastest > 0.0 else np.inf
 
 
 def _largest_eigenvalue(model: Model, damping: bool) -> float:

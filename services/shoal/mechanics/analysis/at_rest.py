@@ -9,7 +9,7 @@ import numpy as np
 
 from shoal.errors import InputError
 from shoal.mechanics.analysis.equilibrium import Equilibrium
-from shoal.mechanics.analysis.evaluate import Evaluator
+from shoal.mechanics.analysis.evaluate import Evaluator, require_no_states
 from shoal.mechanics.analysis.going_on import taken_up
 from shoal.mechanics.analysis.statics import statics
 from shoal.mechanics.ended import start_angles
@@ -44,7 +44,9 @@ def at_start(scene: Scene, *, horizon: float = 0.0) -> Evaluator:
 
     Raises InputError if the scene cannot be modelled, or its start as `begun` does.
     """
-    return Evaluator(begun(Machine.of(scene).model(horizon)), one_sided=True, signals=True)
+    model = begun(Machine.of(scene).model(horizon))
+    require_no_states(model)
+    return Evaluator(model, one_sided=True, signals=True)
 
 
 def _equilibrium(scene: Scene) -> Equilibrium:

@@ -19,6 +19,7 @@ from shoal.mechanics import forces, functions, plane, signals
 from shoal.mechanics.analysis import evaluations
 from shoal.mechanics.analysis.load_stiffness import driven, in_plane, in_space, of_drives
 from shoal.mechanics.applied import Applied
+from shoal.mechanics.closed_loop import feedback_at
 from shoal.mechanics.dynamics import derived_rows, work_space
 from shoal.mechanics.elements.families import KERNELS, lay
 from shoal.mechanics.functions import Functions
@@ -82,7 +83,7 @@ class Evaluator:
 
     lane: of the model; forces and accelerations are available in any lane, all else in the first. one_sided: whether
     the caller sees to contacts, which are open unless their state is put in (`contacts`); signals: whether the caller
-    takes loads that follow these. Raises InputError else.
+    takes loads that follow these, and states. Raises InputError else.
     """
 
     def __init__(self, model: Model, lane: int = 0, *, one_sided: bool = False, signals: bool = False) -> None:
@@ -91,15 +92,10 @@ class Evaluator:
                 f"{model.gap_fields[0]}: motions, reactions, sensors, equilibria and modes take one-sided constraints, "
                 "but not yet steady motions and starts from the end of a run"
             )
-        if states := model.scene.states:
+        if (fields := [*model.signal_fields, *(f"states.{name}" for name in model.scene.states)]) and not signals:
             raise InputError(
-                f"states.{next(iter(states))}: motions know states, but not yet equilibria, modes, reactions, virtual "
-                "sensors, steady motions and starts from the end of a run"
-            )
-        if model.signals and not signals:
-            raise InputError(
-                f"{model.signal_fields[0]}: follows signals, which motions, equilibria and modes know, but not yet "
-                "reactions, virtual sensors, steady motions and starts from the end of a run"
+                f"{fields[0]}: signals and states are known in motions, signals in equilibria and modes, but neither "
+                "yet in reactions, virtual sensors, steady motions and starts from the end of a run"
             )
         self.model, self._strikes = model, False
         self._arrays = model.tile(SINGLE, slice(lane, lane + 1))
@@ -296,8 +292,7 @@ class Evaluator:
         n = self.model.unknowns
         if not arrays.followed:
             return scipy.sparse.csc_array((n, n))
-        evaluations.linearise(SINGLE, arrays, self._room, t)
-        blocks = signals.feedback(arrays.followed, self._room.signals, self.model.force_rows)
+        blocks = feedback_at(arrays, self._room, t)
         return scipy.sparse.csc_array(
             -scipy.sparse.csc_array(blocks[:, signals.FORCE, :n].T) @ scipy.sparse.csr_array(blocks[:, by, :n])
         )
@@ -413,7 +408,7 @@ class Evaluator:
         following = in_plane if self.model.dimensions == plane.DIMENSIONS else in_space
         parts = [*following(arrays, z, strengths), *of_drives(arrays, z, self._drives(arrays, t))]
         if followed := arrays.followed:
-            evaluations.linearise(SINGLE, arrays, self._room, t)
+            feedback_at(arrays, self._room, t)
             register = signals.register(followed, self._room.signals)
             acting = arrays._replace(applied=followed.applied, forces=followed.torques)
             torques = register[followed.torques.drive] * followed.torques.law[forces.AMPLITUDE :: forces.LAW]
@@ -429,6 +424,12 @@ class Evaluator:
         size = self.model.rows
         block = scipy.sparse.csr_array((value, (row, column)), shape=(size, size))
         return scipy.sparse.csc_array(self.expansion.T @ block @ self.expansion)
+
+
+def require_no_states(model: Model) -> None:
+    """Raises InputError for states of the user, which are no coordinates that come to rest with the machine."""
+    if model.scene.states:
+        raise InputError(f"states.{next(iter(model.scene.states))}: equilibria and modes know no states yet")
 
 
 def _scaled(arrays: Arrays, load: float) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from numba import njit, typeof, types
 from shoal.compile import function_pointers, structures
 from shoal.compile.pointers import pointer, raw_type, shift
 from shoal.compile.structures import Reference
-from shoal.mechanics import constraints, dynamics, functions, kernels, signals
+from shoal.mechanics import constraints, dynamics, functions, kernels
 from shoal.mechanics.derived import derive
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.model import Arrays, seen
@@ -56,11 +56,6 @@ def accelerate(tile: Tile, arrays: Arrays, room: Work, t: float, tolerance: floa
 def find_energies(tile: Tile, arrays: Arrays, room: Work) -> None:
     """The energies [J], into room.energy."""
     _run(_stored, tile, arrays, room)
-
-
-def linearise(tile: Tile, arrays: Arrays, room: Work, t: float) -> None:
-    """The derivatives of signals, into their room; all derived rows are filled."""
-    _run(_linearise, tile, arrays, room, t)
 
 
 def count_turns(tile: Tile, arrays: Arrays, room: Work) -> None:
@@ -149,13 +144,6 @@ def _stored(tile, m, w, t, tolerance, out):  # type: ignore[no-untyped-def]
 @njit(cache=True, error_model="numpy")
 def _remember(tile, m, w, t, tolerance, out):  # type: ignore[no-untyped-def]
     dynamics.remember(tile, m, w)
-
-
-@njit(cache=True, error_model="numpy")
-def _linearise(tile, m, w, t, tolerance, out):  # type: ignore[no-untyped-def]
-    derive(tile, m.derived, w.z, m.unknowns, m.rows, False)
-    derive(tile, m.derived, w.zdot, m.unknowns, m.rows, True)
-    signals.follow(tile, m, w, t, w.z, w.zdot, w.a, signals.LINEARISE)
 
 
 @njit(cache=True, error_model="numpy")

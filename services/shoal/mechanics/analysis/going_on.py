@@ -13,7 +13,7 @@ from scipy.interpolate import BPoly
 from shoal.errors import InputError
 from shoal.mechanics.affine import Affine
 from shoal.mechanics.analysis import triads
-from shoal.mechanics.analysis.evaluate import Evaluator
+from shoal.mechanics.analysis.evaluate import Evaluator, require_no_states
 from shoal.mechanics.assembly.groups import start_angle
 from shoal.mechanics.ended import start_angles
 from shoal.mechanics.frames import BeamFrame
@@ -59,6 +59,7 @@ def as_stated(scene: Scene, *, horizon: float = 0.0) -> Evaluator:
     model = Machine.of(scene).model(horizon)
     if isinstance(scene.initial_from, End):
         model = taken_up(model, scene.initial_from)
+    require_no_states(model)
     return Evaluator(model, one_sided=True, signals=True)
 
 

@@ -67,9 +67,6 @@ def pick(solver: Solver, model: Model, limit: Callable[[Model, Facts], float]) -
         limit_of = limit(model, facts("leapfrog")) if model.flexible else np.inf
         name = "leapfrog" if model.flexible else "dop853"
         return Choice(name, "auto: events of contacts end steps of explicit integrators", limit_of)
-    if solver.integrator == "auto" and model.signals:
-        name = "leapfrog" if model.flexible else "dop853"
-        return Choice(name, "auto: loads follow signals", limit(model, facts(name)))
     if solver.integrator != "auto":
         return Choice(solver.integrator, "named by the scene", limit(model, facts(solver.integrator)))
     if model.flexible == 0:
@@ -95,9 +92,6 @@ def choose(solver: Solver, model: Model, tile: Tile, lanes: slice, name: str | N
     if model.gaps.size and not facts(name).explicit:
         others = " or ".join(other for other in INTEGRATORS if facts(other).explicit)
         raise InputError(f"solver.integrator: {name} knows no contacts, as of {model.gap_fields[0]}; use {others}")
-    if model.signals and not facts(name).explicit:
-        others = " or ".join(other for other in INTEGRATORS if facts(other).explicit)
-        raise InputError(f"solver.integrator: {name} knows no signals, as of {model.signal_fields[0]}; use {others}")
     return INTEGRATORS[name].settings(solver, model, tile, lanes)
 
 

@@ -11,18 +11,21 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+from numba import njit, typeof, types
 
-from shoal.compile.pointers import shift
+from shoal.compile.function_pointers import call
+from shoal.compile.pointers import raw_type, shift
 from shoal.compile.simd import add_scaled, assign
+from shoal.compile.structures import Reference
 from shoal.compile.vector import add, clear, copy, subtract
-from shoal.mechanics import constraints, dynamics, kernels, saddle
+from shoal.mechanics import constraints, dynamics, kernels, saddle, signals
 from shoal.mechanics import tangent as tangents
 from shoal.mechanics.derived import derive
 from shoal.mechanics.dynamics import Work
-from shoal.mechanics.integrators import guess
+from shoal.mechanics.integrators import feedback, guess
+from shoal.mechanics.integrators.feedback import Feedback, feedback_room
 from shoal.mechanics.integrators.guess import Guess, guess_room
-from shoal.mechanics.model import Arrays, Model
+from shoal.mechanics.model import Arrays, Model, seen
 from shoal.mechanics.numerics import sparse
 from shoal.mechanics.numerics.tile import Array, Tile
 from shoal.mechanics.tangent import Tangent, assembled, tangent_tile
@@ -54,7 +57,7 @@ class Newton(NamedTuple):
     elements. residual: the unbalanced force, then the change of the coordinates, (rows, lanes). multiplier: lambda,
     kept from step to step, (constraints, lanes). x: right-hand side in the order of elimination. begin: coordinates,
     rates, accelerations and multipliers of the first guess. change, left: the largest change of a coordinate and its
-    estimated error, (lanes,). The kernels take it with pointers (`raw`).
+    estimated error, (lanes,). feedback: of signals, by `_feed_back`. The kernels take it with pointers (`raw`).
     """
 
     tolerance: float
@@ -71,6 +74,7 @@ class Newton(NamedTuple):
     change: Array
     left: Array
     guess: Guess
+    feedback: Feedback
 
 
 def newton_room(solver: Solver, model: Model, tile: Tile, lanes: slice) -> Newton:
@@ -78,7 +82,7 @@ def newton_room(solver: Solver, model: Model, tile: Tile, lanes: slice) -> Newto
     width = len(tile)
     tangent = assembled(model, tile, lanes, tangent_tile(model, tile, lanes, held=True))
     held = max(1, model.constraints.size) * width
-    return Newton(
+    newton = Newton(
         solver.newton_tolerance,
         solver.rank_tolerance,
         tangent,
@@ -93,7 +97,46 @@ def newton_room(solver: Solver, model: Model, tile: Tile, lanes: slice) -> Newto
         np.zeros(width),
         np.zeros(width),
         guess_room(model, tile),
+        feedback_room(model, tile, tangent.pattern.size),
     )
+    if not model.signals:
+        return newton
+    found = kernels.address(("feedback", width), lambda: _kernel(model, tile, lanes, newton))
+    return newton._replace(feedback=newton.feedback._replace(address=found))
+
+
+def _kernel(model: Model, tile: Tile, lanes: slice, newton: Newton) -> kernels.Kernel:
+    """Return the kernel of `_feed_back` with the types of its arguments."""
+    arrays = model.tile(tile, lanes)
+    parts = arrays.followed, newton, seen(arrays), dynamics.work_space(tile, arrays)
+    s, own, m, w = (Reference(raw_type(typeof(part))) for part in parts)
+    return _feed_back, (typeof(tile), s, own, m, w, types.float64, types.CPointer(types.float64), types.boolean)
+
+
+@njit(cache=True, error_model="numpy")
+def _feed_back(tile, s, newton, m, w, damping_factor, x, renew):  # type: ignore[no-untyped-def]
+    """Prepare Woodbury's formula for a new factor, or correct a solution x, in the order of elimination."""
+    f, pattern, place = newton.feedback, newton.tangent.pattern, newton.tangent.held.place
+    placed, n, size = m.constraints.size > 0, m.unknowns, s.strengths
+    if renew:
+        signals.follow(tile, m, w, 0.0, w.z, w.zdot, w.stage, signals.DERIVE)
+        for k in range(size):
+            column = shift(f.column, k * pattern.size * len(tile))
+            for i in range(pattern.size):
+                clear(tile, column, i)
+            for i in range(n):
+                copy(tile, column, place[i] if placed else i, signals.block(tile, s, m, w, k), i)
+            sparse.solve(tile, pattern, newton.matrix, column, 0)
+            for i in range(n):
+                copy(tile, w.stage, i, column, place[i] if placed else i)
+            out = shift(f.inverse, k * size * len(tile))
+            feedback.project(tile, s, m, w, 1.0, damping_factor, w.stage, out)
+        feedback.close(tile, size, f.inverse, f.part)
+    else:
+        for i in range(n):
+            copy(tile, w.stage, i, x, place[i] if placed else i)
+        feedback.project(tile, s, m, w, 1.0, damping_factor, w.stage, f.part)
+        feedback.add(tile, size, f.inverse, f.column, pattern.size, f.part, x)
 
 
 @njit(cache=True, error_model="numpy")
@@ -119,6 +162,9 @@ def correct(
         _renew(tile, m, w, newton, z, mass_factor, damping_factor)
     if count == 0:
         sparse.solve(tile, pattern, newton.matrix, newton.residual, 0)
+        if newton.feedback.address != 0:
+            arguments = (m.signals, newton, m, w, damping_factor, newton.residual, False)
+            call(newton.feedback.address, (tile, *arguments))
         return
     for i in range(m.unknowns):
         copy(tile, newton.x, held.place[i], newton.residual, i)
@@ -126,6 +172,9 @@ def correct(
         clear(tile, newton.x, held.place[m.unknowns + k])
         subtract(tile, newton.x, held.place[m.unknowns + k], w.gauss.gap, k)
     sparse.solve(tile, pattern, newton.matrix, newton.x, 0)
+    if newton.feedback.address != 0:
+        arguments = (m.signals, newton, m, w, damping_factor, newton.x, False)
+        call(newton.feedback.address, (tile, *arguments))
     for i in range(m.unknowns):
         copy(tile, newton.residual, i, newton.x, held.place[i])
     for k in range(count):
@@ -147,6 +196,9 @@ def _renew(tile: Tile, m: Arrays, w: Work, newton: Newton, z: Array, mass_factor
         tolerance = max(newton.rank_tolerance**2, 1e-13)
         # Distances in the metric of the tangent are not recorded; x is free until the right-hand side is put there.
         saddle.eliminate(tile, tangent.pattern, tangent.held.multiplier, matrix, tolerance, newton.x)
+    if newton.feedback.address != 0:
+        arguments = (m.signals, newton, m, w, damping_factor, newton.residual, True)
+        call(newton.feedback.address, (tile, *arguments))
     memory[RENEW], memory[AGE], memory[MASS], memory[DAMPING] = memory[FULL], 0.0, mass_factor, damping_factor
 
 

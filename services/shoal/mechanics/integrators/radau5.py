@@ -15,20 +15,24 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+from numba import njit, typeof, types
 
-from shoal.compile.pointers import raw
-from shoal.compile.vector import clear
-from shoal.mechanics import dynamics, kernels
+from shoal.compile.function_pointers import call
+from shoal.compile.pointers import raw, raw_type, shift
+from shoal.compile.simd import assign
+from shoal.compile.structures import Reference
+from shoal.compile.vector import add_product, clear
+from shoal.mechanics import dynamics, kernels, signals
 from shoal.mechanics import tangent as tangents
 from shoal.mechanics.derived import derive
 from shoal.mechanics.dynamics import Work
-from shoal.mechanics.integrators import control
+from shoal.mechanics.integrators import control, feedback
 from shoal.mechanics.integrators.control import RESOLUTION, Control, control_room
+from shoal.mechanics.integrators.feedback import Feedback, feedback_room
 from shoal.mechanics.integrators.radau5_tableau import DIFFERENCE, FILTER, RATES, STAGES, A, C, T
 from shoal.mechanics.integrators.scheme import Facts, implement
 from shoal.mechanics.least import implicit
-from shoal.mechanics.model import Arrays, Model
+from shoal.mechanics.model import Arrays, Model, seen
 from shoal.mechanics.numerics import sparse
 from shoal.mechanics.numerics.tile import Array, Tile
 from shoal.mechanics.tangent import Tangent, assembled, tangent_tile
@@ -42,6 +46,8 @@ SLOWEST = 0.1
 STAGNANT = 5e-2
 """A change below this that does not shrink anymore is round-off."""
 ORDER_OF_ERROR = 4
+_RENEW, _LOAD, _CORRECT = range(3)
+"""Parts of `_feed_back`."""
 
 
 class Radau5(NamedTuple):
@@ -50,12 +56,13 @@ class Radau5(NamedTuple):
     stiffness, damping: K with the curvature of the constraints, and D, (slots, lanes); factors: of the three stages.
     stage_q, stage_v, stage_a, and of each stage its defect and its product with the Jacobian: (3 * unknowns, lanes).
     change_q, change_v, product: (rows, lanes). slope: acceleration at the beginning. polynomial: of the rate in the
-    last step, (4 * unknowns, lanes); last: the length of that step [s], (1,).
+    last step, (4 * unknowns, lanes); last: the length of that step [s], (1,). feedback: of signals, by `_feed_back`.
     """
 
     rank_tolerance: float
     control: Control
     tangent: Tangent
+    feedback: Feedback
     slots: int
     stiffness: Array
     damping: Array
@@ -105,10 +112,11 @@ def settings(solver: Solver, model: Model, tile: Tile, lanes: slice) -> Radau5:
         }
     )
     slots, rows, unknowns = tangent.mass.size, model.rows * width, model.unknowns * width
-    return Radau5(
+    room = Radau5(
         solver.rank_tolerance,
         control_room(inner, tile),
         tangent,
+        feedback_room(model, tile, model.unknowns, STAGES),
         tangent.pattern.slots,
         np.zeros(slots),
         np.zeros(slots),
@@ -117,10 +125,22 @@ def settings(solver: Solver, model: Model, tile: Tile, lanes: slice) -> Radau5:
         np.zeros(max(1, model.constraints.size) * width),
         *(np.zeros(size) for size in (*(STAGES * unknowns,) * 7, rows, rows, rows, unknowns, 4 * unknowns, 1, 1)),
     )
+    if not model.signals:
+        return room
+    found = kernels.address(("feedback of radau5", width), lambda: _kernel(model, tile, lanes, room))
+    return room._replace(feedback=room.feedback._replace(address=found))
+
+
+def _kernel(model: Model, tile: Tile, lanes: slice, room: Radau5) -> kernels.Kernel:
+    """Return the kernel of `_feed_back` with the types of its arguments."""
+    arrays = model.tile(tile, lanes)
+    parts = arrays.followed, room, seen(arrays), dynamics.work_space(tile, arrays)
+    s, own, m, w = (Reference(raw_type(typeof(part))) for part in parts)
+    return _feed_back, (typeof(tile), s, own, m, w, types.float64, types.int64, types.int64)
 
 
 @njit(cache=True, error_model="numpy")
-def _linearise(tile: Tile, scheme: Radau5, m: Arrays, w: Work) -> None:
+def _linearise(tile: Tile, scheme: Radau5, m: Arrays, w: Work, t: float) -> None:
     """Stiffness and damping at the state in w.z, with the multipliers of its acceleration."""
     multiplier = scheme.multiplier
     for k in range(m.constraints.size * len(tile)):
@@ -136,10 +156,12 @@ def _linearise(tile: Tile, scheme: Radau5, m: Arrays, w: Work) -> None:
     if dynamics.loaded(m):
         for i in range(scheme.slots * len(tile)):
             scheme.damping[i] -= scheme.stiffness[i]
+    if scheme.feedback.address != 0:
+        signals.follow(tile, m, w, dynamics.instant(w, t), w.z, w.zdot, w.stage, signals.LINEARISE)
 
 
 @njit(cache=True, error_model="numpy")
-def _factor(tile: Tile, scheme: Radau5, h: float) -> None:
+def _factor(tile: Tile, scheme: Radau5, m: Arrays, w: Work, h: float) -> None:
     """The matrices M + g D + g^2 K of the three stages, g = h T_ss."""
     pattern = scheme.tangent.pattern
     for s in range(STAGES):
@@ -148,6 +170,8 @@ def _factor(tile: Tile, scheme: Radau5, h: float) -> None:
         for i in range(scheme.slots * len(tile)):
             values[i] = scheme.tangent.mass[i] + g * scheme.damping[i] + g * g * scheme.stiffness[i]
         sparse.factor(tile, pattern, values)
+        if scheme.feedback.address != 0:
+            call(scheme.feedback.address, (tile, m.signals, scheme, m, w, g, s, _RENEW))
 
 
 @njit(cache=True, error_model="numpy")
@@ -165,18 +189,62 @@ def _solve(tile: Tile, scheme: Radau5, m: Arrays, w: Work, h: float, s: int) -> 
     sparse.multiply(tile, pattern, scheme.stiffness, change_q, product)
     for i in range(end):
         product[i] = w.stage[i] - g * product[i]
+    if scheme.feedback.address != 0:
+        call(scheme.feedback.address, (tile, m.signals, scheme, m, w, g, s, _LOAD))
     sparse.solve(tile, pattern, factors, product, 0)
     if m.constraints.size > 0:
         for i in range(end):
             w.stage[i] = product[i] - change_v[i]
-        implicit.prepare(tile, m, factors, pattern, w.z, w.gauss)
-        for k in range(m.constraints.size):
-            clear(tile, w.gauss.gap, k)
-        implicit.add_rates(tile, m, w.gauss, w.stage)
-        implicit.apply(tile, m, w.gauss, scheme.rank_tolerance, product)
+        _constrain(tile, scheme, m, w, factors, product)
+    if scheme.feedback.address != 0:
+        call(scheme.feedback.address, (tile, m.signals, scheme, m, w, g, s, _CORRECT))
     for i in range(end):
         change_v[i] = product[i]
         change_q[i] += g * product[i]
+
+
+@njit(cache=True, error_model="numpy")
+def _constrain(tile: Tile, scheme: Radau5, m: Arrays, w: Work, factors: Array, x: Array) -> None:
+    """Let x, a solution without constraints, obey C_q x = C_q (x - w.stage)."""
+    implicit.prepare(tile, m, factors, scheme.tangent.pattern, w.z, w.gauss)
+    for k in range(m.constraints.size):
+        clear(tile, w.gauss.gap, k)
+    implicit.add_rates(tile, m, w.gauss, w.stage)
+    implicit.apply(tile, m, w.gauss, scheme.rank_tolerance, x)
+
+
+@njit(cache=True, error_model="numpy")
+def _feed_back(tile, s, scheme, m, w, g, stage, part):  # type: ignore[no-untyped-def]
+    """Prepare Woodbury's formula for the matrix of a stage, or apply it around a solution in `product`.
+
+    Signals add g b (dS/dq)' r_q to the right-hand side, and take b (g dS/dv + g^2 dS/dq)' from the matrix.
+    """
+    f, n, size, end = scheme.feedback, m.unknowns, s.strengths, m.unknowns * len(tile)
+    column, inverse = shift(f.column, stage * size * end), shift(f.inverse, stage * size * size * len(tile))
+    if part == _LOAD:
+        feedback.project(tile, s, m, w, g, 0.0, scheme.change_q, f.part)
+        for k in range(size):
+            force = signals.block(tile, s, m, w, k)
+            for i in range(n):
+                add_product(tile, scheme.product, i, f.part, k, force, i)
+    elif part == _CORRECT:
+        feedback.project(tile, s, m, w, g * g, g, scheme.product, f.part)
+        feedback.add(tile, size, inverse, column, n, f.part, scheme.product)
+    else:
+        factors = scheme.factors[0]
+        if stage == 1:
+            factors = scheme.factors[1]
+        elif stage == 2:
+            factors = scheme.factors[2]
+        for k in range(size):
+            x = shift(column, k * end)
+            assign(x, signals.block(tile, s, m, w, k), end)
+            sparse.solve(tile, scheme.tangent.pattern, factors, x, 0)
+            if m.constraints.size > 0:
+                assign(w.stage, x, end)
+                _constrain(tile, scheme, m, w, factors, x)
+            feedback.project(tile, s, m, w, g * g, g, x, shift(inverse, k * size * len(tile)))
+        feedback.close(tile, size, inverse, f.part)
 
 
 @njit(cache=True, error_model="numpy")
@@ -324,11 +392,11 @@ def step(tile: Tile, scheme: Radau5, m: Arrays, w: Work, t: float, h: float) -> 
     for i in range(end):
         room.slope[i] = w.a[i]
     control.weigh(tile, m, w, c)
-    _linearise(tile, room, m, w)
+    _linearise(tile, room, m, w, t)
     h = control.first_trial(c, rest)
     rejected = False
     while True:
-        _factor(tile, room, h)
+        _factor(tile, room, m, w, h)
         _guess(tile, room, m, w, h)
         trial = h
         if _iterate(tile, room, m, w, t, h):
