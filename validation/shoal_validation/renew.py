@@ -62,6 +62,7 @@ STUDIES: dict[str, Study] = {
     "right-models": Study("suspects --kind right --seeds 0:200", ("verdict-charts.md",), "right-models"),
     "selection": Study("selection", ("model-choice.md",)),
     "uncertain": Study("uncertain", ("uncertain-charts.md",)),
+    "contacts-precision": Study("contacts.precision", ("contact-checks.md",)),
     "gallery": Study("gallery", ("gallery.md",)),
     "random-chains": Study("random_space --seeds 0:200", ("validation.md",), counts=True),
     "random-chains-tolerance": Study("random_space --seeds 0:200 --tolerance 1e-3", ("validation.md",), counts=True),
