@@ -116,3 +116,28 @@ def test_surfaces_of_contacts_are_drawn_and_impacts_are_those_of_the_bodies_that
     assert np.ptp(line[..., 1]) == 0.0
     (said,) = told(get_engine("gauss").simulate(scene).model)
     assert "the last event: floor" in said
+
+
+def test_polygons_cams_and_boxes_of_guides_are_drawn_with_their_bodies() -> None:
+    """A point mass carries its circle without turning."""
+    body = {"kind": "rigid-body", "mass": 1.0, "inertia": 0.01}
+    guide = {"kind": "slider", "first": {"body": "ground", "point": [0.0, -1.0]}, "play": 0.01, "size": [0.2, 0.1],
+             "second": {"body": "box", "point": [0.0, 0.0]}}  # fmt: skip
+    ground = {"body": "ground", "point": [0.0, 1.0], "polygon": [[0, 0], [1, 0], [0, 1]]}
+    cam = {"body": "cam", "point": [0.0, 0.0], "cam": {"table": [[0.0, 0.1], [2.0, 0.1], [4.0, 0.1]]}}
+    scene = Scene.parse({
+        "name": "drawn", "gravity": [0.0, 0.0], "joints": {"guide": guide},
+        "bodies": {"ball": {"kind": "point-mass", "mass": 1.0}, "cam": body, "box": body},
+        "contacts": {"hill": {"first": {"body": "ball", "radius": 0.1}, "second": ground},
+                     "cam": {"first": {"body": "ball", "radius": 0.1}, "second": cam}},
+        "markers": {"ball": {"body": "ball"}, "cam": {"body": "cam"}, "box": {"body": "box"}},
+        "initial": {"ball": {"position": [3.0, 3.0]}, "cam": {"position": [5.0, 0.0], "rate": 1.0}},
+        "solver": {"duration": 0.1},
+    })  # fmt: skip
+    moving = scene_motion(scene, get_engine("gauss"), 0.1)
+    drawn = moving.stops
+    np.testing.assert_allclose(drawn["hill second"][0], [[0, 1], [1, 1], [0, 2], [0, 1]])
+    for name, marker in (("hill first", "ball"), ("cam second", "cam")):
+        away = np.linalg.norm(drawn[name] - moving.markers[marker][:, None], axis=2)
+        np.testing.assert_allclose(away, 0.1, atol=1e-9)
+    assert np.ptp(drawn["guide box"][0], axis=0) == pytest.approx([0.2, 0.1])

@@ -40,6 +40,7 @@ FEATURES = (
     "exact stick",
     "contacts",
     "polygons",
+    "cams",
     "corners of polygons",
     "play",
     "backlash",
@@ -94,8 +95,8 @@ def needs(scene: Scene) -> Iterator[tuple[str, str]]:
     yield from ((f"joints.{name}", "closed loops") for name in loops(scene))
     for name, contact in scene.contacts.items():
         yield f"contacts.{name}", "contacts"
-        if contact.second.polygon is not None:
-            yield f"contacts.{name}.second.polygon", "polygons"
+        if contact.second.shape in ("polygon", "cam"):
+            yield f"contacts.{name}.second.{contact.second.shape}", f"{contact.second.shape}s"
         if contact.first.polygon is not None:
             yield f"contacts.{name}.first.polygon", "corners of polygons"
     for name, load in scene.loads.items():

@@ -1,4 +1,4 @@
-"""Outlines of bodies in the plane as chains of features: edges, and the convex corners between them.
+"""Outlines of bodies in the plane as chains of features: edges and the convex corners between them, or parts of cams.
 
 A body that is no farther than its radius from the chain touches one feature of it. The gap is smooth within a feature,
 and its second derivative jumps from one to the next, so that a closed contact keeps its feature, with the edge longer
@@ -13,13 +13,15 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from shoal.mechanics import cams
 from shoal.mechanics.numerics.tile import Array, Flags, Index
 
-EDGE, CORNER = 0, 1
+EDGE, CORNER, SEGMENT = 0, 1, 2
 PLACE, ALONG, LENGTH, BEFORE, AFTER = 0, 2, 4, 5, 8
 """Numbers of an edge: its begin, its unit direction, its length, and of the edges before and after it, where the corner
 is concave, the unit direction away from there and the length (of that before with a minus sign), else 0. Of a corner
-its place, and the unit directions of the edges before it (ALONG) and after it (AFTER)."""
+its place, and the unit directions of the edges before it (ALONG) and after it (AFTER). Those of a segment are in
+`cams`."""
 SIZE = 11
 BESIDE = 2
 """Features on either side of one that touches whose contacts are the same one."""
@@ -90,6 +92,8 @@ def nearest(p: Profiles, pair: int, x: float, y: float, other: int) -> int:
     other: a feature of the same chain, which it and those beside it are not, or -1
     """
     first, count, found, least = p.begin[pair], p.length[pair], -1, np.inf
+    if p.kind[first] == SEGMENT:
+        return cams.nearest(p.numbers, first, count, SIZE, x, y)  # type: ignore[no-any-return]
     for k in range(count):
         if p.kind[first + k] != EDGE or (other >= 0 and abs(k - other) <= BESIDE):
             continue
@@ -131,6 +135,8 @@ def touch(p, pair, feature, kept, x, y):  # type: ignore[no-untyped-def]
         return complex(ENDLESS, 0.0), 1.0 + 0j, 0j, ENDLESS, 1.0
     k = p.begin[pair] + feature
     at = SIZE * k
+    if p.kind[k] == SEGMENT:
+        return cams.touch(p.numbers, at, x, y)
     begin_x, begin_y = p.numbers[at + PLACE], p.numbers[at + PLACE + 1]
     tx, ty = p.numbers[at + ALONG], p.numbers[at + ALONG + 1]
     dx, dy = x - begin_x, y - begin_y

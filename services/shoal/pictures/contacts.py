@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
+from shoal.mechanics.cams import points, segments
 from shoal.mechanics.event_record import place_of
+from shoal.mechanics.profiles import SIZE
 from shoal.mechanics.reach import span
 from shoal.pictures.links import At
 from shoal.pictures.outline import INSIDE
 from shoal.pictures.style import BLACK, GREEN, ORANGE, PURPLE, VERMILION
-from shoal.scene import GROUND, Attachment, Revolute, Rod, Scene, Slider
+from shoal.scene import GROUND, Attachment, PointMass, Revolute, Rod, Scene, Slider
 from shoal.scene.clearances import contacts_of, with_play
 from shoal.scene.contacts import ContactSurface
 from shoal.scene.joints import Distance, is_loose, places
@@ -82,7 +84,8 @@ class Limits:
     """The stops and the surfaces of contacts of a scene in the plane, with the markers that they are drawn by.
 
     A stop of a hinge is the arc of its range about the joint, beside the first body; one of a slider a tick across it.
-    Bodies that bend show none, as they have no axes of their own at a joint. Surfaces are circles, lines and polygons.
+    Bodies that bend show none, as they have no axes of their own at a joint. Surfaces are circles, lines, polygons and
+    cams.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -127,7 +130,7 @@ class Limits:
         return self._size * np.concatenate([arc, *ticks])
 
     def _surface(self, side: ContactSurface) -> Array | None:
-        """Return a circle or a polygon about the place of a surface, or a line through it [m], (points, 2).
+        """Return a circle, a polygon or a cam about the place of a surface, or a line through it [m], (points, 2).
 
         None of a point.
         """
@@ -135,6 +138,9 @@ class Limits:
             return self._size * np.array([[-1.0], [1.0]]) * [np.cos(side.line), np.sin(side.line)]
         if side.polygon is not None:
             return np.array([*side.polygon, side.polygon[0]])
+        if side.cam is not None:
+            outline = points(segments(side.cam, SIZE))
+            return np.concatenate([outline, outline[:1]])
         angle = np.linspace(0.0, 2.0 * np.pi, 2 * ARC)
         radius = side.radius if side.hole is None else side.hole
         return radius * np.stack([np.cos(angle), np.sin(angle)], axis=1) if radius else None
@@ -154,14 +160,17 @@ class Limits:
         return np.stack([point for place in places for point in (place - across, place + across, gap)])
 
     def _carried(self, side: Attachment, lines: Array) -> Callable[[At, int], Array]:
-        """Return the lines with a body, by two markers on it."""
+        """Return the lines with a body, by two markers on it; a point mass does not turn."""
         place = np.array(self._scene.location(side), dtype=float)
         if side.body == GROUND:
             return lambda _, frames: np.broadcast_to(place + lines, (frames, *lines.shape))
         names = [f"{INSIDE}-stop-{len(self.markers) + k}" for k in range(2)]
-        points = place, place + np.array([self._size, 0.0])
+        if isinstance(self._scene.bodies[side.body], PointMass):
+            self.markers[names[0]] = {"body": side.body, "point": place.tolist()}
+            return lambda at, _: at(names[0])[:, None] + lines
+        ends = place, place + np.array([self._size, 0.0])
         self.markers |= {
-            name: {"body": side.body, "point": point.tolist()} for name, point in zip(names, points, strict=True)
+            name: {"body": side.body, "point": point.tolist()} for name, point in zip(names, ends, strict=True)
         }
 
         def drawn(at: At, frames: int) -> Array:

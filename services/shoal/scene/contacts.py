@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import Annotated, Any
 
 import numpy as np
@@ -13,11 +15,47 @@ from shoal.scene.joints import Attachment, origin_of_ground
 from shoal.scene.polygons import check_polygon
 from shoal.scene.record import Angle, Axis, NonNegative, Positive, Record
 
-SHAPES = ("line", "plane", "hole", "polygon")
+SHAPES = ("line", "plane", "hole", "polygon", "cam")
+FULL = 2.0 * math.pi
+
+
+class Cam(Record):
+    """The outline of a cam about a place: its radius over the angle in the body, counter-clockwise from the x axis.
+
+    A periodic cubic spline leads through the points.
+    """
+
+    table: Annotated[tuple[tuple[float, Positive], ...], Field(min_length=3)]
+    """Angles [rad] with radii [m]; the angles grow, by less than the period."""
+    period: Annotated[float, Field(gt=0, le=FULL * (1.0 + 1e-9))] = FULL
+    """Angle [rad] after which the outline repeats, a full turn over a whole number of lobes."""
+
+    @property
+    def lobes(self) -> int:
+        """Return how often the outline repeats in a turn."""
+        return round(FULL / self.period)
+
+    @model_validator(mode="after")
+    def _closes(self) -> Cam:
+        if abs(self.lobes * self.period / FULL - 1.0) > 1e-9:
+            raise ValueError(
+                f"period: must be 2 pi over a whole number, as 6.283185307179586, found {self.period:.12g}"
+            )
+        angles = [angle for angle, _ in self.table]
+        for k, (one, other) in enumerate(pairwise([*angles, angles[0] + self.period]), 1):
+            if not one < other:
+                end = k == len(angles)
+                why = (
+                    f"must be less than a period beyond the first one, {angles[0]:g}"
+                    if end
+                    else f"must grow from {one:g}"
+                )
+                raise ValueError(f"table.{k - end}: {why}, found {one if end else other:g}")
+        return self
 
 
 class ContactSurface(Attachment):
-    """A place on a body and the surface there: a point, a circle or sphere, a line, a plane, a hole or a polygon."""
+    """A place on a body and the surface there: a point, circle or sphere, a line, plane, hole, polygon or cam."""
 
     radius: NonNegative = 0.0
     """Radius of a circle, in space of a sphere, about the place [m]; 0 of a point."""
@@ -33,9 +71,12 @@ class ContactSurface(Attachment):
     """Corners of a polygon from the place, in the axes of the body, in the plane [m]: counter-clockwise of a solid,
     clockwise of a room in which the other body is."""
 
+    cam: Cam | None = None
+    """Outline of a cam about the place, in the plane."""
+
     @property
     def shape(self) -> str:
-        """Return `line`, `plane`, `hole` or `polygon`, or `round` of a circle, a sphere or a point."""
+        """Return `line`, `plane`, `hole`, `polygon` or `cam`, or `round` of a circle, a sphere or a point."""
         return next((name for name in SHAPES if getattr(self, name) is not None), "round")
 
     @model_validator(mode="after")
@@ -110,8 +151,9 @@ def check_contacts(scene: Any, contacts: Mapping[str, Contact]) -> None:
         if contact.second.shape == wrong:
             where = f"{path}.second.{wrong}"
             raise ValueError(f"{where}: with dimensions: {scene.dimensions} a flat surface is a {right}")
-        if scene.dimensions == 3 and contact.second.shape == "polygon":
-            raise ValueError(f"{path}.second.polygon: is of the plane; with dimensions: 3 state a plane, or a sphere")
+        if scene.dimensions == 3 and contact.second.shape in ("polygon", "cam"):
+            where = f"{path}.second.{contact.second.shape}"
+            raise ValueError(f"{where}: is of the plane; with dimensions: 3 state a plane, or a sphere")
         for field in ("first", "second"):
             side = getattr(contact, field)
             body = scene.bodies.get(side.body)
@@ -121,7 +163,7 @@ def check_contacts(scene: Any, contacts: Mapping[str, Contact]) -> None:
                 continue
             if side.axis is not None:
                 raise ValueError(f"{path}.{field}.axis: {side.body} is no rigid body, which a disc needs")
-            if side.shape in ("line", "plane", "polygon"):
+            if side.shape in ("line", "plane", "polygon", "cam"):
                 where = f"{path}.{field}.{side.shape}"
                 raise ValueError(f"{where}: {side.body} is no rigid body, which such a surface needs")
             if contact.rubs and kind != "point-mass" and np.any(side.radius or side.hole or 0.0):

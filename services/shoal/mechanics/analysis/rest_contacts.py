@@ -37,7 +37,7 @@ class RestContacts:
         outlined = np.isin(gaps.kind, PAIR) & np.isin(gaps.number, np.flatnonzero(gaps.pairs.shape == PROFILE))
         if np.any(outlined):
             name = model.gap_fields[int(np.argmax(outlined))]
-            raise InputError(f"{name}.second.polygon: equilibria and modes take lines, circles and holes")
+            raise InputError(f"{name}.second: equilibria and modes take lines, circles and holes, no polygons and cams")
         self._evaluator, self.resolution = evaluator, gaps.resolution
         measured, of_pairs = gaps.measures, _measures(gaps.pairs)
         self._angles = measured.size

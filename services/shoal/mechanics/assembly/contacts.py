@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from shoal.errors import InputError
-from shoal.mechanics import plane
+from shoal.mechanics import cams, plane
 from shoal.mechanics.affine import Affine, fixed
 from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.assembly.measures import ElementForceLaw, Measures
+from shoal.mechanics.cams import least_radii, segments
 from shoal.mechanics.derived import RowAllocator
 from shoal.mechanics.forces import DISTANCE, LAW, NATURAL, PLACE
 from shoal.mechanics.frames import RigidFrame
@@ -20,7 +21,7 @@ from shoal.mechanics.gaps import DRY, GIVES, LAW_SIZE, LIMIT, PAIR, RIGID, Gaps
 from shoal.mechanics.joints import conditions
 from shoal.mechanics.numerics.tile import Array, Number, index, stacked
 from shoal.mechanics.pairs import FLAT, HOLE, PROFILE, ROUND, Pairs
-from shoal.mechanics.profiles import CORNER, Profiles, chains
+from shoal.mechanics.profiles import CORNER, SEGMENT, SIZE, Profiles, chains
 from shoal.mechanics.reach import span
 from shoal.scene import (
     GROUND,
@@ -227,7 +228,7 @@ class Contacts(Measures):
         """Let two surfaces touch. path: of what states the contact."""
         first, second = contact.first, contact.second
         places = [self.placement.point(self.scene, side) for side in (first, second)]
-        shape = {"hole": HOLE, "round": ROUND, "polygon": PROFILE}.get(second.shape, FLAT)
+        shape = {"hole": HOLE, "round": ROUND, "polygon": PROFILE, "cam": PROFILE}.get(second.shape, FLAT)
         normal = places[0]
         if shape == FLAT:
             direction = second.plane if second.line is None else second.line + math.pi / 2
@@ -240,7 +241,7 @@ class Contacts(Measures):
             turns.append(bool(directors))
             rows += [place, *(directors or [place] * (1 if self.scene.dimensions == 2 else 3))]
         reach = second.radius if second.hole is None else second.hole
-        parts = [(0, 0, False, 0, (0, 0))] if second.polygon is None else self._outline(corners_of(second.polygon))
+        parts = self._outline(path, contact)
         static = contact.mu if contact.mu_static is None else contact.mu_static
         for chain in parts:
             self._chains.append(chain)
@@ -254,17 +255,32 @@ class Contacts(Measures):
             )  # fmt: skip
         flat = None if first.axis is None else axle
         if contact.law is None:
-            gap = (
-                self._start_gap(shape, places, normal, flat, first.radius, reach)
-                if second.polygon is None
-                else self._outside(corners_of(second.polygon), places, self._directors(second)) - first.radius
-            )
+            if shape == PROFILE:
+                gap = self._outside(second, places) - first.radius
+            else:
+                gap = self._start_gap(shape, places, normal, flat, first.radius, reach)
             self._check(path, gap, 0.0, LOWER)
 
-    def _outline(self, corners: Array) -> list[tuple[int, int, bool, int, tuple[int, int]]]:
-        """Add the chains of a polygon; return them for every pair of surfaces, of which some chains want two."""
-        found, every = [], chains(corners, is_concave(corners))
+    def _outline(self, path: str, contact: Contact) -> list[tuple[int, int, bool, int, tuple[int, int]]]:
+        """Add the chains of an outline; return them for every pair of surfaces, of which some chains want two."""
         begin = sum(len(one) for one, _ in self._features)
+        second, radius = contact.second, float(np.max(contact.first.radius))
+        if second.cam is not None:
+            numbers = segments(second.cam, SIZE)
+            least, hollow = least_radii(numbers)
+            if least <= 0.0:
+                raise InputError(f"{path}.second.cam.table: the outline goes through its place; state larger radii")
+            if radius >= hollow:
+                raise InputError(
+                    f"{path}.first.radius: a roller of {radius:g} m does not fit into a hollow of the cam, of a radius "
+                    f"of curvature of {hollow:.3g} m"
+                )
+            self._features.append((np.full(len(numbers), SEGMENT), numbers))
+            return [(begin, len(numbers), True, 0, (begin, begin))]
+        if second.polygon is None:
+            return [(0, 0, False, 0, (0, 0))]
+        corners = corners_of(second.polygon)
+        found, every = [], chains(corners, is_concave(corners))
         whole = begin, begin + sum(len(kinds) for kinds, _, _ in every)
         for kinds, numbers, turn in every:
             self._features.append((kinds, numbers))
@@ -275,13 +291,16 @@ class Contacts(Measures):
             begin += len(kinds)
         return found
 
-    def _outside(self, corners: Array, places: list[Affine], directors: list[Affine]) -> Number:
-        """Return how far the first place is outside a polygon at the start [m]."""
+    def _outside(self, second: ContactSurface, places: list[Affine]) -> Number:
+        """Return how far the first place is outside the outline of the second surface at the start [m]."""
         one, other = (self.placement.start_of(place)[0] for place in places)
+        directors = self._directors(second)
         axis = self.placement.start_of(directors[0])[0] if directors else np.array([[1.0], [0.0]])
-        away = one - other
-        across = plane.cross(axis, away)
-        return distance(corners, np.stack(np.broadcast_arrays(sum(axis * away), across)) / np.sqrt(sum(axis**2)))
+        way = one - other
+        local = np.stack(np.broadcast_arrays(sum(axis * way), plane.cross(axis, way))) / np.sqrt(sum(axis**2))
+        if second.cam is not None:
+            return cams.distance(segments(second.cam, SIZE), local)
+        return distance(corners_of(second.polygon or ()), local)
 
     def _directors(self, side: ContactSurface) -> list[Affine]:
         """Return vectors that turn with a body; none for the ground, point masses, and rods, which touch at a point."""
