@@ -144,6 +144,8 @@ class Balance:
 
         Those without a force stay open, with the force zero.
         """
+        if not self.contacts.size:
+            return {}
         gaps, _ = self.contacts.at(q)
         self.closed = touching = np.flatnonzero(np.abs(gaps) <= TOUCHING * self.size).tolist()
         while self._open(self.look(q)):

@@ -23,7 +23,7 @@ from shoal.mechanics.closed_loop import feedback_at
 from shoal.mechanics.dynamics import derived_rows, work_space
 from shoal.mechanics.elements.families import KERNELS, lay
 from shoal.mechanics.functions import Functions
-from shoal.mechanics.gaps import Gaps, enter
+from shoal.mechanics.gaps import DRY, KEPT, STICK, Gaps, enter
 from shoal.mechanics.kernels import ready
 from shoal.mechanics.machine import Machine
 from shoal.mechanics.model import Arrays, Model, laid
@@ -76,6 +76,19 @@ class Pressing(NamedTuple):
     axes: Array
     gap: Array
     bias: Array
+
+
+class Sticking(NamedTuple):
+    """What keeps a machine at rest, with friction by the forces that runs begin with.
+
+    acceleration: that is left, (unknowns,); rows: gradients along which contacts hold it, (rows, unknowns); share: of
+    the limit of its friction that each contact takes, (contacts,).
+    """
+
+    acceleration: Array
+    pressing: Pressing
+    rows: Array
+    share: Array
 
 
 class Evaluator:
@@ -186,6 +199,25 @@ class Evaluator:
         """What contacts exert at rest that press with such forces [N or N m], (contacts,), and have no friction."""
         evaluations.follow_gaps(SINGLE, self._arrays, self._room, q[None], np.zeros((1, len(q))))
         return self._exerting(np.stack([normal, 0.0 * normal, 0.0 * normal], axis=1), 0.0 * normal)
+
+    def sticking(self, q: Array, t: float = 0.0) -> Sticking:
+        """What keeps a machine at rest, with friction."""
+        g, gaps, size, n = self._room.gaps, self.gaps, self.gaps.size, self.model.unknowns
+        ways = 1 + gaps.tangents
+        self._enter(q, None)
+        enter(gaps, g, np.zeros((size, KEPT)))
+        evaluations.rest(SINGLE, self._arrays, self._room, t, self.model.scene.solver.rank_tolerance)
+        closed, force = g.closed != 0.0, g.force.reshape(size, ways)
+        held = np.zeros((size, ways), dtype=bool)
+        held[:, 0], held[:, 1:] = closed & (gaps.kind != DRY), (closed & (g.mode == STICK))[:, None]
+        held[gaps.kind == DRY, 2:] = False
+        rows = g.gradient.reshape(size, ways, n)[held]
+        limit = gaps.mu_static.ravel() * force[:, 0] + g.given
+        needed = np.where(closed, np.linalg.norm(force[:, 1:], axis=1), 0.0)
+        share = np.divide(needed, limit, out=np.zeros(size), where=(limit > 0.0) & (gaps.rolls == 0))
+        found = Sticking(self._room.a[:n].copy(), self.pressing, rows, share)
+        enter(gaps, g, np.zeros((size, KEPT)))
+        return found
 
     def _exerting(self, force: Array, mode: Array) -> Pressing:
         g, size = self._room.gaps, len(force)

@@ -14,7 +14,7 @@ from numba import njit, typeof, types
 from shoal.compile import function_pointers, structures
 from shoal.compile.pointers import pointer, raw_type, shift
 from shoal.compile.structures import Reference
-from shoal.mechanics import constraints, dynamics, functions, kernels
+from shoal.mechanics import constraints, contact_events, dynamics, functions, kernels
 from shoal.mechanics.derived import derive
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.model import Arrays, seen
@@ -73,6 +73,11 @@ def follow_gaps(tile: Tile, arrays: Arrays, room: Work, q: Array, v: Array) -> t
     _run(_follow, tile, arrays, room, float(samples), 0.0, out)
     value, rate = out[-2 * samples * size :].reshape(2, samples, size)
     return value, rate
+
+
+def rest(tile: Tile, arrays: Arrays, room: Work, t: float, tolerance: float) -> None:
+    """The acceleration at rest, into room.a, with the contacts that touch closed, and sticking where they can."""
+    _run(_rest, tile, arrays, room, t, tolerance)
 
 
 def signatures(tile: Tile, arrays: Arrays, room: Work) -> list[kernels.Kernel]:
@@ -144,6 +149,13 @@ def _stored(tile, m, w, t, tolerance, out):  # type: ignore[no-untyped-def]
 @njit(cache=True, error_model="numpy")
 def _remember(tile, m, w, t, tolerance, out):  # type: ignore[no-untyped-def]
     dynamics.remember(tile, m, w)
+
+
+@njit(cache=True, error_model="numpy")
+def _rest(tile, m, w, t, tolerance, out):  # type: ignore[no-untyped-def]
+    kernels.acceleration(tile, m, w, t, w.z, w.zdot, tolerance, w.a)
+    if contact_events.touching(tile, m, w) > 0.0:
+        kernels.decide(tile, m, w, t, tolerance)
 
 
 @njit(cache=True, error_model="numpy")

@@ -72,6 +72,11 @@ UNSTABLE = _rejects(
     "unstable", EquilibriumStatus.UNSTABLE, "The forces balance, and a small displacement grows.", "allow it to leave"
 )
 SNAPPED = Kind("snapped", Severity.NOTE, "The machine snapped through or buckled while the loads were applied.")
+STICKS = Kind(
+    "held-by-friction",
+    Severity.NOTE,
+    "Dry friction holds the machine where it starts; the share is that of the limit which it takes at most.",
+)
 LEFT_UNSTABLE = Kind("unstable-left", Severity.NOTE, "An unstable equilibrium was met first, and left.")
 FREE_SPIN = Kind("free-to-spin", Severity.NOTE, "A body may spin about its own axis, which moves nothing.")
 NEGLECTED = Kind(

@@ -8,11 +8,13 @@ Dry friction is left out, and drives stand still where they are at the stated ti
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
 import numpy as np
 import scipy.linalg
+import scipy.sparse
 
 from shoal.arguments import check
 from shoal.errors import InputError
@@ -24,7 +26,7 @@ from shoal.mechanics.analysis import left_out
 from shoal.mechanics.analysis.balance import BALANCED, FALLS, Balance, View
 from shoal.mechanics.analysis.damped import small
 from shoal.mechanics.analysis.equilibrium import Equilibrium
-from shoal.mechanics.analysis.evaluate import Evaluator
+from shoal.mechanics.analysis.evaluate import Evaluator, Sticking
 from shoal.mechanics.analysis.findings import EquilibriumStatus, status_of
 from shoal.mechanics.analysis.going_on import as_stated
 from shoal.mechanics.analysis.idle_spins import idle_spins
@@ -70,16 +72,19 @@ def statics(scene: Scene, time: float = 0.0, *, leave_unstable: bool = True, rea
     loads have a potential. Without a potential it is stable where no small motion grows, with the damping of the
     machine. The message names neglected effects. reactions: compute those in the joints as well.
 
+    Where dry friction that sticks (of contacts, or `stick: exact`) holds the machine at its start, this is the start.
+
     Raises InputError if the scene cannot be modelled.
     """
-    return seek(scene, time, leave_unstable=leave_unstable, reactions=reactions)[0]
+    check(time=time)
+    search = _Search(scene, as_stated(scene, horizon=time), time, reactions)
+    return search.stuck() or search.run(leave_unstable)
 
 
 def seek(
     scene: Scene, time: float = 0.0, *, leave_unstable: bool = True, reactions: bool = True
 ) -> tuple[Equilibrium, Balance]:
-    """Return the equilibrium as `statics` does, and the balance of forces that was looked at there last."""
-    check(time=time)
+    """Return the equilibrium without friction as `statics` does, and the balance that was looked at there last."""
     search = _Search(scene, as_stated(scene, horizon=time), time, reactions)
     return search.run(leave_unstable), search.balance
 
@@ -107,6 +112,7 @@ class _Search:
         self.iterations = self.steps = 0
         self.spinning: list[str] = []
         self.pressing: dict[str, float] = {}
+        self.friction: Sticking | None = None
         self.kept: tuple[Array, tuple[Array, Array, Array]] | None = None
         self.wound = np.zeros(len(self.owners))
         self.last = self.directions.at(evaluator.model.q0[:, 0])
@@ -152,6 +158,32 @@ class _Search:
         if not found.converged and (endless := self._endless(found)):
             return self._ending(found.point, endless)
         return self._ending(found.point, self._assess(found, met), found)
+
+    def stuck(self) -> Equilibrium | None:
+        """Return the start, where friction holds all of the machine; None where it does not."""
+        if not self.evaluator.gaps.tangents:
+            return None
+        q = self._assembled()
+        if left_out.driving(self.evaluator, q, self.time):
+            return None
+        held, seen = self.evaluator.sticking(q, self.time), self.evaluator.at(q, t=self.time)
+        rows = scipy.sparse.vstack([seen.jacobian, scipy.sparse.csr_array(held.rows)])
+        scale = self.balance.metric.size(seen.force)
+        still = self.balance.length(held.acceleration) <= BALANCED * scale
+        if not still or self.balance.metric.freedom(scipy.sparse.csr_array(rows)).degrees:
+            return None
+        self.friction = held
+        names, numbers = self.balance.contacts.names, self.balance.contacts.numbers
+        normal = held.pressing.force[numbers, 0]
+        self.pressing = {name: float(size) for name, size in zip(names, normal, strict=True) if size > 0.0}
+        worst = int(np.argmax(held.share))
+        text = f"friction holds it where it starts, by {held.share[worst]:.3g} of its limit"
+        where = f" ({self.evaluator.model.gap_fields[worst]})" if held.share[worst] else ""
+        found = self._ending(
+            q, [kinds.STICKS.found(text + where, share=float(held.share[worst]))], Root(q, True, 0, 0.0)
+        )
+        residual = self.balance.length(held.acceleration) / scale if scale else 0.0
+        return replace(found, residual=residual, eigenvalues=np.zeros(0), levels=np.zeros(0))
 
     def _polished(self, found: Root[Array]) -> Root[Array]:
         """Return an equilibrium to the digits that Newton's method has."""
@@ -256,15 +288,19 @@ class _Search:
         eigenvalues, levels, _ = self._eigen(q)
         is_pressed = any(self.pressing.values())
         pressed = self.balance.pressed(q) if is_pressed else None
+        pressed = pressed if self.friction is None else self.friction.pressing
         known = balanced and not self.evaluator.model.signals
         react = (
             cache(lambda: reactions_of(self.evaluator, q, rest, rest, self.time, pressing=pressed)) if known else None
         )
-        neglected = [left_out.friction(self.scene, react), left_out.driven(self.evaluator, q, self.time)]
+        neglected = [left_out.driven(self.evaluator, q, self.time)]
+        if self.friction is None:
+            neglected.insert(0, left_out.friction(self.scene, react))
         if fields := self.evaluator.model.signal_fields if self.reactions else ():
             neglected.append(f"reactions of joints are left out where loads follow signals ({', '.join(fields)})")
         rubbing = (name for name, one in self.scene.contacts.items() if one.rubs)
-        if rough := [name for name in rubbing if f"contacts.{name}" in self.pressing]:
+        rough = [name for name in rubbing if f"contacts.{name}" in self.pressing]
+        if self.friction is None and rough:
             neglected.append(f"friction is left out ({', '.join(rough)}): the surfaces may stick at other places, too")
         return Equilibrium(
             scene=self.stated,
