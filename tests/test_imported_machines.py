@@ -202,19 +202,19 @@ CHAINS = {
 
 @pytest.mark.parametrize("name", CHAINS)
 def test_joints_that_no_single_one_stands_for_are_a_chain(name: str, tmp_path: Path) -> None:
-    """Of bodies that weigh 1e-9 of what they carry; what acts in each joint acts in the scene too."""
+    """Of bodies that weigh 1.5e-8 of what they carry; what acts in each joint acts in the scene too."""
     path = written(CHAINS[name], tmp_path)
     found = read(path)
     assert found.left_out == ()
     assert any(body.endswith("-link") for body in found.scene["bodies"])
-    assert apart(path, found.scene) < 1e-8
+    assert apart(path, found.scene) < 1e-7
 
 
 def test_a_chain_starts_with_the_rates_of_its_file(tmp_path: Path) -> None:
     joints = '<joint axis="0 1 0" pos="0 .1 .08"/><joint axis="1 0 .5" damping=".1"/><joint type="slide" axis="1 1 0"/>'
     key = '<keyframe><key name="start" qvel="1 2 .3"/></keyframe>'
     path = written(machine(joints, more=key), tmp_path)
-    assert apart(path, read(path).scene) < 1e-8
+    assert apart(path, read(path).scene) < 1e-7
 
 
 @pytest.mark.parametrize(
@@ -273,3 +273,21 @@ def test_springs_that_rest_off_the_start_have_a_potential(tmp_path: Path) -> Non
     mujoco.mj_step(model, data, 4000)
     places = np.array([data.body(name).xpos if name in "bp" else data.site(name).xpos for name in scene.markers])
     assert found.points == pytest.approx(places, abs=1e-8)
+
+
+TENDONS = """<mujoco><option gravity="0 0 -9.81"><flag contact="disable"/></option><worldbody>
+<body name="a"><joint name="h" axis="0 1 0"/><inertial pos=".1 0 0" mass="1" diaginertia=".02 .02 .02"/>
+<body name="b" pos=".3 0 0"><joint name="p" axis="0 1 0"/><inertial pos=".1 0 0" mass=".4" diaginertia=".01 .01 .01"/>
+<body name="c" pos=".2 0 0"><joint name="s" type="slide" axis="1 0 1"/>
+<inertial pos="0 0 0" mass=".2" diaginertia=".01 .01 .01"/></body></body></body></worldbody>
+<tendon><fixed name="t"><joint joint="h" coef="2"/><joint joint="p" coef="-1"/><joint joint="s" coef=".5"/></fixed>
+</tendon><equality><tendon tendon1="t" solref="2e-4 1" solimp=".99999 .99999 .001 .5 2"/></equality></mujoco>"""
+
+
+def test_an_equality_of_a_tendon_over_joints_is_a_transmission(tmp_path: Path) -> None:
+    path = written(TENDONS, tmp_path)
+    found = read(path)
+    assert found.missing == ()
+    (kind,) = {one["kind"] for name, one in found.scene["joints"].items() if name not in ("h", "p", "s")}
+    assert kind == "transmission"
+    assert apart(path, found.scene) < 1e-5

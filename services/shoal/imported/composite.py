@@ -8,8 +8,9 @@ import numpy as np
 
 from shoal.imported.rounding import ROUNDED, Array
 
-SMALL = 1e-9
-"""Mass of a body without one, per mass that it carries: accelerations change by as little (checked to 1e-10 m)."""
+SMALL = float(np.sqrt(np.finfo(float).eps))
+"""Mass of a body without one, per mass that it carries, 1.5e-8: accelerations change by as much, and their round-off is
+eps over it."""
 
 
 @dataclass
@@ -63,7 +64,7 @@ def movable(own: Moments, carried: Moments) -> tuple[Moments, str, str]:
     if own.mass < SMALL / 2 * carried.mass:
         mass = SMALL * carried.mass
         added = Moments.of(mass, own.centre, np.eye(3) * mass * carried.size**2)
-        return own + added, f"has no mass; given {mass:.2g} kg, {SMALL:g} of what it carries", ""
+        return own + added, f"has no mass; given {mass:.2g} kg, {SMALL:.2g} of what it carries", ""
     values, axes = np.linalg.eigh(own.inertia)
     if values[0] < -ROUNDED * abs(values[2]):
         return own, "", f"its moment of inertia {values[0]:.3g} kg m^2 is negative"

@@ -28,6 +28,8 @@ def add_equalities(source: Source, parts: Parts) -> None:
             continue
         if kind == kinds.mjEQ_JOINT:
             joint, what = _coupling(source, number, parts), f"{what} {_coupled(source, number)}"
+        elif kind == kinds.mjEQ_TENDON:
+            joint = _of_tendons(source, number, parts)
         elif kind in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD):
             joint = _joint(source, number, kind == kinds.mjEQ_WELD)
             what += " in another pose than that of the start" * (joint is None)
@@ -52,6 +54,24 @@ def _coupling(source: Source, number: int, parts: Parts) -> dict[str, Any] | Non
         return None
     terms = [(driven, 1.0)] + ([(driving, -float(factor))] if driving >= 0 and factor else [])
     return transmission(source, terms, parts)
+
+
+def _of_tendons(source: Source, number: int, parts: Parts) -> dict[str, Any] | None:
+    """The transmission of a linear equality of fixed tendons, whose lengths are sums of coordinates of joints."""
+    model = source.model
+    tendon, other = int(model.eq_obj1id[number]), int(model.eq_obj2id[number])
+    factor, *curved = model.eq_data[number][1:5]
+    found: dict[int, float] = {}
+    for one, share in [(tendon, 1.0)] + ([(other, -float(factor))] if other >= 0 else []):
+        first = model.tendon_adr[one]
+        for wrap in range(first, first + model.tendon_num[one]):
+            if model.wrap_type[wrap] != source.mujoco.mjtWrap.mjWRAP_JOINT:
+                return None
+            joint = int(model.wrap_objid[wrap])
+            found[joint] = found.get(joint, 0.0) + share * float(model.wrap_prm[wrap])
+    if (other >= 0 and any(curved)) or model.eq_data[number][0]:
+        return None
+    return transmission(source, [one for one in found.items() if one[1]], parts)
 
 
 def transmission(source: Source, terms: list[tuple[int, float]], parts: Parts) -> dict[str, Any] | None:

@@ -50,6 +50,31 @@ class Imported:
     warnings: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True)
+class Loaded:
+    """A file as MuJoCo has compiled it, with its XML, what it says beside that, and MuJoCo's warnings."""
+
+    xml: XmlElement
+    robot: Robot
+    model: Any
+    warnings: tuple[str, ...]
+
+
+def load(file: Path, root: Root | None = None, arguments: Mapping[str, str] | None = None) -> Loaded:
+    """Return the model of a URDF or MJCF file. Raises InputError. For the arguments see `read`."""
+    import mujoco
+
+    if not file.is_file():
+        raise InputError(f"{file}: no such file")
+    xml = parse(file, file.read_bytes())
+    if file.suffix == ".xacro" or any(one.tag.startswith("xacro:") for one in xml.walk()):
+        xml = parse(file, expand(file, arguments or {}))
+    with warnings.catch_warnings(record=True, action="always") as told:
+        robot = urdf_robot(mujoco, file, xml, root) if xml.tag == "robot" else _mjcf(mujoco, file, xml)
+        model = _compiled(file, robot.spec)
+    return Loaded(xml, robot, model, tuple(" ".join(str(one.message).split()) for one in told))
+
+
 def read(file: Path, root: Root | None = None, arguments: Mapping[str, str] | None = None) -> Imported:
     """Return the scene of a URDF or MJCF file at its own start, in metres, kilograms, seconds and radians.
 
@@ -59,28 +84,21 @@ def read(file: Path, root: Root | None = None, arguments: Mapping[str, str] | No
     """
     import mujoco
 
-    if not file.is_file():
-        raise InputError(f"{file}: no such file")
-    written = file.read_bytes()
-    xml = parse(file, written)
-    if file.suffix == ".xacro" or any(one.tag.startswith("xacro:") for one in xml.walk()):
-        xml = parse(file, expand(file, arguments or {}))
-    with warnings.catch_warnings(record=True, action="always") as told:
-        robot = urdf_robot(mujoco, file, xml, root) if xml.tag == "robot" else _mjcf(mujoco, file, xml)
-        model = _compiled(file, robot.spec)
-    switch_off(mujoco, model)
-    source = Source.of(mujoco, model)
+    loaded = load(file, root, arguments)
+    robot = loaded.robot
+    switch_off(mujoco, loaded.model)
+    source = Source.of(mujoco, loaded.model)
     parts = _parts(source)
     add_loops(file, source, robot.loops, parts)
     notes = [*robot.notes, *parts.notes]
     if not parts.bodies:
         raise InputError(f"{file}: nothing in it moves{''.join(f'; {line}' for line in [*robot.left_out, *notes][:3])}")
     parts.left_out = robot.left_out + parts.left_out
-    _audit(file, xml, parts)
+    _audit(file, loaded.xml, parts)
     scene = _scene(source, parts, re.sub(r"[^A-Za-z0-9_-]", "-", file.stem))
     _count_angles(scene, parts.away, str(file))
-    warned = tuple(" ".join(str(one.message).split()) for one in told)
-    return Imported(scene, tuple(parts.left_out), tuple(parts.missing), (*notes, *limits.note(parts)), warned)
+    notes += limits.note(parts)
+    return Imported(scene, tuple(parts.left_out), tuple(parts.missing), tuple(notes), loaded.warnings)
 
 
 def _mjcf(mujoco: Any, file: Path, root: XmlElement) -> Robot:

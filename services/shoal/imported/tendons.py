@@ -19,9 +19,7 @@ def add_tendons(source: Source, parts: Parts) -> None:
     for number, name in enumerate(names):
         low, high = source.model.tendon_lengthspring[number]
         if not _is_straight(source, number) or low != high:
-            acts = _law(source, number) or source.model.tendon_limited[number]
-            add = parts.miss if acts else parts.left_out.append
-            add(f"tendon {name}: more than a spring between two sites")
+            _tell(source, number, name, parts)
             continue
         parts.left_out += [f"tendon {name}: its {what}" for what in _further(source, number)]
         first = source.model.tendon_adr[number]
@@ -34,6 +32,26 @@ def add_tendons(source: Source, parts: Parts) -> None:
         if acts := _law(source, number):
             load = {"kind": "spring", **sides, **acts, "length": float(low)}
             parts.loads[name if name not in parts.loads else f"{name}-tendon"] = load
+
+
+def _tell(source: Source, number: int, name: str, parts: Parts) -> None:
+    """A line for a tendon over joints, or over more than two sites: only a rope over several holds bodies."""
+    acts = [
+        "its spring" if "stiffness" in (law := _law(source, number)) else "",
+        "its damping" if "damping" in law else "",
+    ]
+    acts += [f"its {what}" for what in _further(source, number)]
+    first = source.model.tendon_adr[number]
+    over = source.model.wrap_type[first] == source.mujoco.mjtWrap.mjWRAP_JOINT
+    if source.model.tendon_limited[number]:
+        low, high = source.model.tendon_range[number]
+        acts.append(f"its limits {low:g} to {high:g}")
+    where = "over joints" if over else "between more than two sites"
+    line = f"tendon {name}: {where}{''.join(f'; {what}' for what in acts if what)}"
+    if source.model.tendon_limited[number] and not over:
+        parts.miss(line)
+    else:
+        parts.left_out.append(line)
 
 
 def _lengths(source: Source) -> dict[int, int]:

@@ -28,8 +28,9 @@ it is the larger one, and changes a frequency of torsion by less than 1e-3.
 """
 STATE = 1e-40
 """Mass of an unknown whose rate is a state of the user: so small that its energy is none."""
-PHASE = 1e-9
-"""Mass of an unknown of a joint without a rotor, per inertia of the lighter body: accelerations change by as little."""
+PHASE = float(np.sqrt(np.finfo(float).eps))
+"""Mass of an unknown of a joint without a rotor, per inertia of the lighter body: accelerations change by as much, and
+their round-off is eps over it."""
 Entries = dict[tuple[int, int], Number]
 
 
@@ -63,7 +64,7 @@ class Masses:
             self.mass[unknown, unknown] = STATE
 
     def _of_phase(self, name: str) -> Number:
-        """Return the mass of the free motion of a joint: of its rotor [kg m^2 or kg], and a negligible one."""
+        """Return the mass of the free motion of a joint: of its rotor [kg m^2 or kg], or a negligible one."""
         joint = self.scene.joints[name]
         assert isinstance(joint, Revolute | Slider)
         least = np.inf
@@ -79,7 +80,7 @@ class Masses:
             else:
                 size = sum(row[k] for k, row in enumerate(second_moments(body)))
             least = min(least, float(np.min(size)))
-        return joint.armature + PHASE * least
+        return np.maximum(joint.armature, PHASE * least)
 
     def _lend(self, name: str) -> None:
         """The place that a pin holds on the ground has its body's mass besides: it is at rest, so nothing else changes.
