@@ -42,6 +42,11 @@ FEW: dict[str, tuple[tuple[str, ...], tuple[Any, ...], tuple[Any, ...]]] = {
     "space-slenderness": (("leapfrog", "generalized-alpha 0.9"), (2e-4, 1e-2), (100.0, 500.0)),
     "space-twist": (("director rod, generalized-alpha",), (1, 4), (0.0, 24.0)),
     "chaos-flexible": (("leapfrog", "generalized-alpha 1"), (0.5, 2.5), (5e-4, 1e-3)),
+    "contacts-step": (("auto", "leapfrog"), (0.0, 0.8, 1.0), (0.02, 1e-3)),
+    "contacts-gap": (("auto", "rk4"), (-0.5, 0.0), (0.0, 0.8)),
+    "contacts-grazing": (("auto", "leapfrog", "semi-implicit-euler"), (1e-9, 1e-4), (0.02, 1e-3)),
+    "contacts-friction": (("auto", "leapfrog"), (0.0, 0.2, 1.0), (0.0, 0.95)),
+    "contacts-count": (("auto", "rk4"), (1, 8), (1e-3,)),
 }
 """Methods, x and y of the fast tests; among them cells at which a single run says `ok` and is wrong."""
 

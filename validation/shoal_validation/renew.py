@@ -50,6 +50,11 @@ class Study:
 STUDIES: dict[str, Study] = {
     "work-precision": Study("work_precision", ("accuracy-and-speed.md", "accuracy-figures.md", "accuracy-in-space.md")),
     "stability": Study("stability", ("stability.md",)),
+    "contacts-maps": Study(
+        "stability --only contacts-step --only contacts-gap --only contacts-grazing --only contacts-friction "
+        "--only contacts-count",
+        ("contact-checks.md",),
+    ),
     "ablation": Study("ablation", ("swarm-charts.md",)),
     "methods": Study("inverse_precision", ("identification-charts.md",)),
     "chaos": Study("inverse_precision.chaos", ("identification-charts.md",)),

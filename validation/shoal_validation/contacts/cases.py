@@ -58,24 +58,31 @@ def pendulum(stop: float = -0.2, kept: float = 0.8, start: float = np.pi / 3, ti
 def struck(stop: float, kept: float, start: float, time: float, length: float = 1.0) -> float:
     """Return the angle from the vertical of the rod of `pendulum` at a time [s]: elliptic functions between impacts.
 
-    stop <= 0: reached while the rod still speeds up or slows down behind the vertical; the rod must strike it.
+    stop <= 0: at or behind the vertical, which the rod must reach; it rests there after an accumulation if the stop is
+    at the vertical, or with no restitution comes to it after every swing from the stop.
     """
     slow = np.sqrt(1.5 * G / length)
+
+    def phase_of_stop(k: float) -> float:
+        # Without restitution the stop is where the rod turns round, but for round-off.
+        return float(ellipkinc(np.arcsin(np.clip(np.sin(stop / 2) / k, -1.0, 1.0)), k * k))
 
     def swing(top: float) -> float:
         """Time from the top angle to the stop."""
         k = np.sin(top / 2)
-        return float((ellipk(k * k) - ellipkinc(np.arcsin(np.sin(stop / 2) / k), k * k)) / slow)
+        return (float(ellipk(k * k)) - phase_of_stop(k)) / float(slow)
 
     top, last, hit = start, None, swing(start)
     while hit <= time:
         rate = np.sqrt(3.0 * G / length * (np.cos(stop) - np.cos(top)))
         top, last = np.arccos(np.cos(stop) - (kept * rate) ** 2 * length / (3.0 * G)), hit
+        if stop == 0.0 and top < 1e-12:
+            return 0.0
         hit += 2.0 * swing(top)
     k = np.sin(top / 2)
     if last is None:
         return float(2.0 * np.arcsin(k * ellipj(ellipk(k * k) - slow * time, k * k)[0]))
-    phase = ellipkinc(np.arcsin(np.sin(stop / 2) / k), k * k) + slow * (time - last)
+    phase = phase_of_stop(k) + slow * (time - last)
     return float(2.0 * np.arcsin(k * ellipj(phase, k * k)[0]))
 
 

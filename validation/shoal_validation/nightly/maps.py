@@ -1,4 +1,4 @@
-"""The lines of the stability maps in space: no cell of ours may say that all is well and be wrong."""
+"""The lines of the stability maps in space and of contacts: no cell of ours may say that all is well and be wrong."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from shoal_validation.nightly.line import Line
 from shoal_validation.nightly.measure import Measured
 from shoal_validation.stability import MAPS
 
-IN_SPACE = tuple(name for name in MAPS if name.startswith("space-"))
+NAMES = tuple(name for name in MAPS if name.startswith(("space-", "contacts-")))
 REASON = "no run that is off by a tenth of the machine may say ok"
 SOURCE = "the references of the map"
 
 
 def lines() -> Iterator[Line]:
     """One for each map, on three values of each axis and with our own methods."""
-    for name in IN_SPACE:
+    for name in NAMES:
         run = partial(silently_wrong, name)
         yield Line(f"map/{name}", "gauss", "all methods", 0.0, REASON, run, SOURCE, "cells", quick=False, noise=0.5)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from shoal_validation.stability import (
+    contacts,
     in_space,
     long_runs,
     quadrature,
@@ -34,6 +35,7 @@ MAPS = {
         in_space.SPIN,
         rods_in_space.SLENDERNESS,
         rods_in_space.TWIST,
+        *contacts.MAPS,
     )
 }
 

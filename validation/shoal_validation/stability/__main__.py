@@ -1,4 +1,7 @@
-"""`python -m shoal_validation.stability`: run the maps, draw them, and write their section of docs/stability.md."""
+"""`python -m shoal_validation.stability`: run the maps, draw them, and write their sections of docs.
+
+Those of contacts stand in docs/contact-checks.md, the others in docs/stability.md.
+"""
 
 from __future__ import annotations
 
@@ -22,6 +25,8 @@ from shoal_validation.stability.page import section
 from shoal_validation.stability.survey import Result, stored, survey
 
 DOCS = Path(__file__).parents[3] / "docs"
+CONTACTS = "contacts-"
+"""How names of maps of contacts begin."""
 
 
 def main() -> None:
@@ -50,7 +55,10 @@ def main() -> None:
         results.append(result)
     if asked.out == DOCS / "charts":
         known = [stored(one, kept[name]) for name, one in MAPS.items() if name in kept]
-        rewrite(DOCS / "stability.md", "stability", section(known))
+        touching = [one for one in known if one.name.startswith(CONTACTS)]
+        others = [one for one in known if one not in touching]
+        for page, shown in (("stability.md", others), ("contact-checks.md", touching)):
+            rewrite(DOCS / page, "stability", section(shown))
     _note(f"{time.perf_counter() - began:.0f} s")
     Console(highlight=False, width=150).print(table(results))
 
