@@ -40,6 +40,7 @@ COMMANDS = {
         "single-pendulum --speeds 0,1",
         "single-pendulum --about noon",
     ),
+    "linearize": ("andrews-squeezer --inputs motor --about start", "single-pendulum --inputs motor"),
     "reactions": ("single-pendulum --at 0.1", "single-pendulum --at -1"),
     "sweep": (
         f"single-pendulum --vary initial.OA.angle=0:1:3 {SHORT}",

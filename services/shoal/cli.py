@@ -21,7 +21,7 @@ from typing import Any
 
 import click
 
-from shoal.commands.analysis import modes, reactions, statics
+from shoal.commands.analysis import linearize, modes, reactions, statics
 from shoal.commands.built_in import problems, scenes
 from shoal.commands.forward import compare, simulate, sweep
 from shoal.commands.installation import doctor, export, export_fmu, import_scene, serve
@@ -127,7 +127,7 @@ def _extras_named() -> Iterator[None]:
     commands=[
         *(scenes, problems, library),
         *(simulate, sweep, uncertain, compare),
-        *(statics, modes, reactions),
+        *(statics, modes, linearize, reactions),
         *(identify, design),
         *(serve, export, export_fmu, import_scene, doctor),
     ],

@@ -72,6 +72,7 @@ class Client:
 
     simulate = _by_service(notebook.simulate)
     statics = _by_service(notebook.statics)
+    linearize = _by_service(notebook.linearize)
     modes = _by_service(notebook.modes)
     reactions = _by_service(notebook.reactions)
     export = _by_service(notebook.export)

@@ -19,6 +19,7 @@ from shoal.requests.export import Export
 from shoal.requests.fields import At, Data, OfScene
 from shoal.requests.function import function
 from shoal.requests.identify import Identify
+from shoal.requests.linearize import Linearize as LinearizeRequest
 from shoal.requests.modes import Modes as ModesRequest
 from shoal.requests.reactions import Reactions as ReactionsRequest
 from shoal.requests.select import Select
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
     from shoal.mechanics.analysis.equilibrium import Equilibrium
     from shoal.mechanics.analysis.joint_reactions import Reactions
     from shoal.mechanics.analysis.modes import Modes
+    from shoal.mechanics.linear_model import LinearModel
     from shoal.pictures.inline import Picture
     from shoal.response import Response
     from shoal.selection import Selection
@@ -259,6 +261,26 @@ def modes(asked: ModesRequest) -> Modes | Campbell:
         return of_campbell(diagram, scene) if asked.verify else diagram
     found = modes(scene, about=asked.about, count=asked.count)
     return of_modes(found, scene) if asked.verify else found
+
+
+@function(LinearizeRequest)
+def linearize(asked: LinearizeRequest) -> LinearModel:
+    """Find the linear model of a scene.
+
+    Returns:
+        The matrices A, B, C and D with the names of states, inputs and outputs, poles and zeros.
+
+    Raises:
+        InputError: A field is wrong; the message names it.
+        ComputationError: There is no equilibrium, or the start moves.
+
+    Examples:
+        >>> shoal.linearize("andrews-squeezer", ["motor"], about="start").states
+        ('angle(O)', 'rate(O)')
+    """
+    from shoal.mechanics.linear_model import linearize
+
+    return linearize(machine(asked), list(asked.inputs), list(asked.outputs), about=asked.about, time=asked.time)
 
 
 @function(Export)

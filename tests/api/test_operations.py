@@ -37,6 +37,7 @@ CALLS: dict[str, tuple[tuple[Any, ...], dict[str, Any]]] = {
     "uncertain": ((SCENE, {"initial.OA.angle": (0.3, 0.4)}, [0.1, 0.2]), {"runs": 200, "seed": 3, "limit": ["B.y>0"]}),
     "statics": (("flexible-double-pendulum",), {"set": {"gravity": [0.5, -1.62]}}),
     "modes": (("flexible-double-pendulum",), {"count": 3, "about": "equilibrium"}),
+    "linearize": (("andrews-squeezer", ["motor"]), {"about": "start"}),
     "reactions": ((SCENE, np.array([0.0, 0.1])), {}),
     "export": (("single-pendulum", "exudyn"), {"set": {"solver.duration": 0.1}}),
     "identify": (("paper-case-1",), {"method": "least-squares", "seed": 1}),
@@ -49,6 +50,7 @@ ERRORS: dict[str, tuple[str, ...]] = {
     "uncertain": ("error",),
     "statics": ("error",),
     "modes": ("modes", "0", "error"),
+    "linearize": ("error",),
     "reactions": ("reactions", "0", "unbalanced"),
     "export": ("distance",),
     "identify": ("parameters", "theta1", "std"),
@@ -120,7 +122,7 @@ def test_the_answer_is_the_librarys(client: Client, name: str) -> None:
     assert place is not None
 
 
-@pytest.mark.parametrize("name", ["select", "sweep", "statics", "modes", "reactions"])
+@pytest.mark.parametrize("name", ["select", "sweep", "statics", "modes", "linearize", "reactions"])
 @pytest.mark.by_day(2)
 def test_without_the_client_it_is_what_the_command_prints(gauss: httpx.Client, name: str) -> None:
     arguments, options = CALLS[name]

@@ -228,6 +228,11 @@ class Modes(AtRest):
     speeds: Annotated[list[Annotated[float, Field(ge=0)]], Field(min_length=1, max_length=1000)] | None = None
 
 
+@of("linearize")
+class Linearize(AtRest):
+    """A linear model for the design of controllers."""
+
+
 @of("reactions")
 class Reactions(OfScene):
     """Forces and torques in the joints."""
@@ -269,6 +274,7 @@ OPERATIONS: dict[str, type[Request]] = {
     "uncertain": Uncertain,
     "statics": Statics,
     "modes": Modes,
+    "linearize": Linearize,
     "reactions": Reactions,
     "export": Export,
     "identify": Identify,

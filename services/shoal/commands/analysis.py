@@ -10,6 +10,7 @@ from shoal.commands.options import Out
 from shoal.errors import check_trusted
 
 if TYPE_CHECKING:
+    from shoal.requests.linearize import Linearize
     from shoal.requests.modes import Modes
     from shoal.requests.reactions import Reactions
     from shoal.requests.statics import Statics
@@ -51,6 +52,27 @@ def modes(asked: Modes, as_json: bool, out: Out) -> None:
     if out is not None:
         files.modes(found, out)
     screen.show(found.to_json(), as_json, lambda: tables.modes_table(found))
+    check_trusted(found.ok, found.message)
+
+
+@command("linearize")
+@options.as_json
+@options.out(".json", ".npz", ".mat", ".png")
+def linearize(asked: Linearize, as_json: bool, out: Out) -> None:
+    """The linear model x' = A x + B u, y = C x + D u of SCENE: matrices, poles and zeros.
+
+    With --out a file for other tools, or Bode's diagram.
+    """
+    from shoal.notebook import linearize, machine
+    from shoal.pictures import files
+    from shoal.terminal import screen, tables
+
+    scene = machine(asked, options.note)
+    with screen.working(f"linear model of {scene.name}"):
+        found = linearize.answer(asked.of(scene))
+    if out is not None:
+        files.linear_model(found, out)
+    screen.show(found.to_json(), as_json, lambda: tables.linear_table(found))
     check_trusted(found.ok, found.message)
 
 

@@ -21,6 +21,7 @@ from shoal.mechanics.assembly.placement import place
 from shoal.mechanics.integrators.scheme import Facts
 from shoal.mechanics.model import Model
 from shoal.scene import Scene, Solver
+from shoal.scene.formula import Node
 
 T = TypeVar("T")
 
@@ -85,6 +86,14 @@ class Machine:
         """Return the model, with functions of time up to `horizon` [s] at least. Raises InputError."""
         end = max(horizon, self.scene.solver.duration)
         return self.kept(("model", end), lambda: build(self.scene, horizon=end, placement=self.placement))
+
+    def probed(self, probes: tuple[Node, ...], horizon: float) -> Model:
+        """Return the model with formulas that are looked at; see `build`."""
+        end = max(horizon, self.scene.solver.duration)
+        return self.kept(
+            ("probed", end, probes),
+            lambda: build(self.scene, horizon=end, placement=self.placement, probes=probes),
+        )
 
 
 def step_limit(model: Model, integrator: Facts) -> float:

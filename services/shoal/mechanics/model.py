@@ -124,7 +124,8 @@ class Model:
     q0, v0: initial coordinates and rates, (unknowns, lanes). Arrays of lane-dependent numbers are
     (rows, lanes) or (rows, 1). start_angles: relative angles at the start that angle forces count
     their turns from [rad], (forces, lanes) or (forces, 1); gap_angles, signal_angles: the same of gaps and of signals;
-    gap_fields, signal_fields: what states them. kinks: of every function, where it or a derivative jumps.
+    gap_fields, signal_fields: what states them; signal_names: of the constants of signals; probed: numbers of the
+    strengths that formulas beside those of loads are. kinks: of every function, where it or a derivative jumps.
     owners: for each family of elements the body of every element. failed: lanes whose start contradicts the joints,
     (lanes,) or (1,). frames: kinematics of the bodies. mass_entries, lent_entries, stretching_entries: the lower
     triangles of the mass matrix, of the mass added to thin bodies, and of the rods' stiffness against stretching, see
@@ -169,6 +170,8 @@ class Model:
     signals: Signals | tuple[()]
     signal_angles: Array
     signal_fields: tuple[str, ...]
+    signal_names: tuple[str, ...]
+    probed: tuple[int, ...]
     slowed: int = 0
     marker_angles: Array | None = None
     shared_tiles: dict[int, Arrays] = field(default_factory=dict, compare=False, repr=False)

@@ -68,11 +68,13 @@ def registers(signals: Signals) -> int:
 def room(signals: Any, width: int, rows: int) -> Array:
     """Return the room of the signals of a tile.
 
-    The continuous angles of measures, the registers, their adjoints, one row of power, and the blocks of `linearise`.
+    The continuous angles of measures, the registers, their adjoints, one row of power, and what `linearise` finds: the
+    blocks of every strength, then its derivatives by the constants.
     """
     if not signals:
         return np.zeros(0)
-    return np.zeros((signals.measures.size + 2 * registers(signals) + 1 + BLOCKS * rows * signals.strengths) * width)
+    by_strength = BLOCKS * rows + signals.constants
+    return np.zeros((signals.measures.size + 2 * registers(signals) + 1 + by_strength * signals.strengths) * width)
 
 
 def register(signals: Signals, own: Array) -> Array:
@@ -82,7 +84,26 @@ def register(signals: Signals, own: Array) -> Array:
 
 def feedback(signals: Signals, own: Array, rows: int) -> Array:
     """Return what `linearise` left in the room of one lane, (strengths, BLOCKS, rows)."""
-    return own[signals.measures.size + 2 * registers(signals) + 1 :].reshape(signals.strengths, BLOCKS, rows)
+    size = BLOCKS * rows * signals.strengths
+    return own[signals.measures.size + 2 * registers(signals) + 1 :][:size].reshape(signals.strengths, BLOCKS, rows)
+
+
+def by_constants(signals: Signals, own: Array) -> Array:
+    """Return the derivatives of all strengths by the constants that `linearise` left, (strengths, constants)."""
+    size = signals.strengths * signals.constants
+    return own[len(own) - size :].reshape(signals.strengths, signals.constants)
+
+
+def on_a_kink(signals: Signals, own: Array) -> bool:
+    """Return whether an operation of the tape is where its value or its derivative jumps, but for round-off."""
+    numbers = register(signals, own)
+    for operation, a, b, _ in signals.code.reshape(-1, tape.ENTRIES).tolist():
+        x, y = float(numbers[a]), float(numbers[b])
+        if operation in (tape.MINIMUM, tape.MAXIMUM) and abs(x - y) <= tape.ROUND * (abs(x) + abs(y)):
+            return True
+        if operation in (tape.ABSOLUTE, tape.STEP) and abs(x) <= tape.ROUND:
+            return True
+    return False
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -143,7 +164,7 @@ def block(tile: Tile, s: Signals, m: Any, w: Any, k: int) -> Array:
 
 @njit(cache=True, error_model="numpy")
 def linearise(tile: Tile, s: Signals, m: Any, w: Any, z: Array, zdot: Array) -> None:
-    """Find of every strength S, evaluated before, the force on the unknowns if it is 1, dS/dq and dS/dv.
+    """Find of every strength S, evaluated before, the force on the unknowns if it is 1, dS/dq, dS/dv, dS/dconstants.
 
     What a rate changes with the coordinates, v'd2g/dq2, is left out, as of dampers; at rest it is zero. Uses w.element.
     """
@@ -176,6 +197,9 @@ def linearise(tile: Tile, s: Signals, m: Any, w: Any, z: Array, zdot: Array) -> 
             add(tile, by_rate, s.velocity[number], adjoint, at + number)
         for part in range(BLOCKS):
             fold(tile, m.derived, shift(force, part * end), m.force_rows)
+        for i in range(s.constants):
+            at = (2 * count + 1) * width + BLOCKS * s.strengths * end
+            copy(tile, shift(register, at), k * s.constants + i, adjoint, s.first - s.constants + i)
 
 
 @njit(cache=True, error_model="numpy")

@@ -25,6 +25,8 @@ CODES = {
 """Operations of `formula.OPERATIONS` by their codes."""
 ENTRIES = 4
 """Numbers of an instruction."""
+ROUND = 1e-12
+"""Difference of the sides of a switch that is round-off, over their size."""
 
 
 @njit(cache=True, error_model="numpy")

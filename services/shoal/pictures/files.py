@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Callable
-from io import StringIO
+from io import BytesIO, StringIO
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from shoal.mechanics.analysis.campbell import Campbell
     from shoal.mechanics.analysis.equilibrium import Equilibrium
     from shoal.mechanics.analysis.modes import Modes
+    from shoal.mechanics.linear_model import LinearModel
     from shoal.pictures.answer import Answer
     from shoal.response import Response
     from shoal.scene import Scene
@@ -220,7 +221,28 @@ def modes(found: Modes | Campbell, path: Path) -> None:
         raise InputError(f"out: {path} holds a Campbell diagram; add --speeds LOW:HIGH:COUNT, or write a .json")
 
 
-def _plotted(result: Estimate | Sweep | Comparison | Equilibrium | Campbell) -> bytes:
+def linear_model(found: LinearModel, path: Path) -> None:
+    """The matrices for other tools, or Bode's diagram."""
+    matrices = {name: getattr(found, name.lower()) for name in "ABCD"}
+    names = {name: getattr(found, name) for name in ("states", "inputs", "outputs")}
+
+    def numpy_archive() -> bytes:
+        file = BytesIO()
+        arrays: dict[str, Any] = {**matrices, **{key: np.array(value) for key, value in names.items()}}
+        np.savez(file, **arrays)
+        return file.getvalue()
+
+    def matlab() -> bytes:
+        from scipy.io import savemat
+
+        file: Any = BytesIO()
+        savemat(file, {**matrices, **{key: np.array(value, dtype=object) for key, value in names.items()}})
+        return bytes(file.getvalue())
+
+    save(path, {".json": _json(found), ".npz": numpy_archive, ".mat": matlab, ".png": lambda: _plotted(found)})
+
+
+def _plotted(result: Estimate | Sweep | Comparison | Equilibrium | Campbell | LinearModel) -> bytes:
     """The picture that a notebook shows."""
     from shoal.pictures.inline import plot
     from shoal.pictures.style import png
@@ -229,7 +251,7 @@ def _plotted(result: Estimate | Sweep | Comparison | Equilibrium | Campbell) -> 
 
 
 def _json(
-    result: Trajectory | Design | Sweep | Comparison | Response | Equilibrium | Modes | Campbell,
+    result: Trajectory | Design | Sweep | Comparison | Response | Equilibrium | Modes | Campbell | LinearModel,
 ) -> Callable[[], str]:
     """Return the writer of the JSON of `--json`, one number a line."""
     return lambda: json_text(result.to_json(), indent=1)

@@ -17,6 +17,8 @@ from shoal.errors import InputError
 from shoal.identification import Estimate
 from shoal.mechanics.analysis.campbell import Campbell
 from shoal.mechanics.analysis.equilibrium import Equilibrium
+from shoal.mechanics.linear_model import LinearModel
+from shoal.pictures.bode import bode
 from shoal.pictures.campbell import campbell
 from shoal.pictures.drawn import Drawn
 from shoal.pictures.engines import engines
@@ -74,6 +76,11 @@ def _(equilibrium: Equilibrium) -> Picture:
 @plot.register
 def _(diagram: Campbell) -> Picture:
     return Picture(campbell(diagram))
+
+
+@plot.register
+def _(model: LinearModel) -> Picture:
+    return Picture(bode(model))
 
 
 @plot.register

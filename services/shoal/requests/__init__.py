@@ -11,7 +11,7 @@ from typing import Any
 
 NAMES = (
     *("simulate", "select", "sweep", "compare", "uncertain"),
-    *("statics", "modes", "reactions", "export", "fmu"),
+    *("statics", "modes", "linearize", "reactions", "export", "fmu"),
     *("identify", "design"),
 )
 """Commands that have a request, which is the class of that name in the module of that name."""

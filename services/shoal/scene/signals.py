@@ -22,7 +22,7 @@ from shoal.scene.record import Positive, Record
 TAKEN = {"t", "pi", "e", *expression.ONE, *expression.MANY, *MEASURES}
 _MOST, _DEEPEST = 2000, 200
 """Operations of a signal that is written out, and how deep they are nested: bounds on time and memory."""
-_TURNING, _SLIDING = (Revolute, DrivenAngle, Cylindrical), (Slider, Cylindrical)
+TURNING, SLIDING = (Revolute, DrivenAngle, Cylindrical), (Slider, Cylindrical)
 _AXES = "xyz"
 
 
@@ -65,14 +65,8 @@ def check_signals(scene: Any) -> None:
             raise ValueError(f"{part}.{name}: the name is taken by formulas; use another one")
         if part == "states" and name in scene.signals:
             raise ValueError(f"states.{name}: there is a signal of this name; use another one")
-    known = scene.signals.keys() | scene.states.keys()
     for where, function in signal_functions(scene):
-        for leaf in _leaves(function):
-            if isinstance(leaf, Measure):
-                _check_measure(scene, where, leaf)
-            elif leaf != "t" and leaf not in known:
-                there = f"; there are {', '.join([*scene.signals, *scene.states])}" if known else ""
-                raise ValueError(f"{where}: {function.expression!r} has {leaf!r}, which is not known{there}; t is time")
+        check_leaves(scene, where, function)
     if isinstance(scene.initial_from, End) and (fields := [*following(scene), *scene.states]):
         raise ValueError(f"initial.from: signals and states ({fields[0]}) do not yet start at the end of a run")
     size, depth = dict[str, int](), dict[str, int]()
@@ -84,6 +78,17 @@ def check_signals(scene: Any) -> None:
                 f"signals.{name}: too long where signals are written out; at most {_MOST} operations, nested at most "
                 f"{_DEEPEST} deep"
             )
+
+
+def check_leaves(scene: Any, where: str, function: SignalFunction) -> None:
+    """Raises ValueError for names and measures of a function that a scene does not have; where: its field."""
+    known = scene.signals.keys() | scene.states.keys()
+    for leaf in _leaves(function):
+        if isinstance(leaf, Measure):
+            _check_measure(scene, where, leaf)
+        elif leaf != "t" and leaf not in known:
+            there = f"; there are {', '.join([*scene.signals, *scene.states])}" if known else ""
+            raise ValueError(f"{where}: {function.expression!r} has {leaf!r}, which is not known{there}; t is time")
 
 
 def signal_functions(scene: Any) -> Iterator[tuple[str, SignalFunction]]:
@@ -138,15 +143,15 @@ def place(scene: Any, name: str) -> Attachment:
 def joint_of(scene: Any, measure: Measure) -> Any:
     """Return the joint whose motion is measured; None of the angle of a body. Raises ValueError."""
     (name,) = measure.names
-    wanted = _TURNING if measure.kind in ("angle", "rate") else _SLIDING
+    wanted = TURNING if measure.kind in ("angle", "rate") else SLIDING
     joint = scene.joints.get(name)
-    if joint is None and wanted is _TURNING and name in scene.bodies:
+    if joint is None and wanted is TURNING and name in scene.bodies:
         return None
     if joint is None:
-        bodies = " or body" if wanted is _TURNING else ""
+        bodies = " or body" if wanted is TURNING else ""
         known = ", ".join(one for one, each in scene.joints.items() if isinstance(each, wanted)) or "none"
         raise ValueError(f"no joint{bodies} {name!r}; of this kind there are {known}")
-    if wanted is _TURNING and name in scene.bodies:
+    if wanted is TURNING and name in scene.bodies:
         raise ValueError(f"{name!r} is the name of a joint and of a body; rename one of them")
     if not isinstance(joint, wanted):
         kinds = " or ".join(str(one.model_fields["kind"].default) for one in wanted)

@@ -63,6 +63,21 @@ class Evaluation:
         return self.strain + self.gravity + self.applied
 
 
+class Probe(NamedTuple):
+    """Formulas f of the model at a state, and its forces by the constants c of signals.
+
+    value: f, (probes,); by_place, by_rate: df/dq and df/dv, (probes, unknowns); by_constants: df/dc, (probes,
+    constants); force: dQ/dc, (unknowns, constants); kink: whether a formula is where its derivative jumps
+    """
+
+    value: Array
+    by_place: Array
+    by_rate: Array
+    by_constants: Array
+    force: Array
+    kink: bool
+
+
 class Pressing(NamedTuple):
     """What contacts exert at a state.
 
@@ -327,6 +342,22 @@ class Evaluator:
         blocks = feedback_at(arrays, self._room, t)
         return scipy.sparse.csc_array(
             -scipy.sparse.csc_array(blocks[:, signals.FORCE, :n].T) @ scipy.sparse.csr_array(blocks[:, by, :n])
+        )
+
+    def probe(self, q: Array, v: Array | None = None, t: float = 0.0) -> Probe:
+        """Look at the formulas of the model that are probed, and at how signals that are numbers act on it."""
+        self._enter(q, v)
+        model, own, followed = self.model, self._room.signals, self._arrays.followed
+        assert followed
+        blocks, probed = feedback_at(self._arrays, self._room, t)[..., : model.unknowns], list(model.probed)
+        by_constants, register = signals.by_constants(followed, own), signals.register(followed, own)
+        return Probe(
+            register[followed.strength[probed]],
+            blocks[probed, signals.BY_PLACE],
+            blocks[probed, signals.BY_RATE],
+            by_constants[probed],
+            blocks[:, signals.FORCE].T @ by_constants,
+            signals.on_a_kink(followed, own),
         )
 
     def strain_energies(self, q: Array) -> dict[str, float]:

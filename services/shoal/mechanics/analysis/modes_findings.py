@@ -66,4 +66,12 @@ ABOUT_DOUBTED = Kind(
     "equilibrium-doubted", Severity.CAUTION, "The equilibrium that the modes are about is not stable or not unique."
 )
 FRICTION_LEFT_OUT = Kind("friction-left-out", Severity.CAUTION, "Dry friction is not part of small motions.")
+UNSTABLE_POLE = Kind("unstable-pole", Severity.CAUTION, "A pole of a linear model grows: the machine leaves its rest.")
+ON_A_KINK = Kind(
+    "on-a-kink", Severity.CAUTION, "A signal of a linear model is where its derivative jumps; one side is taken."
+)
+BY_DIFFERENCES = Kind(
+    "by-differences", Severity.NOTE, "A linear model about a state that moves or is not in balance is of differences."
+)
+LOWEST_MODES = Kind("lowest-modes", Severity.NOTE, "A linear model is of the lowest modes of a large machine.")
 GROWS_AT = Kind("grows-at-speeds", Severity.NOTE, "At some speeds of the diagram a small motion grows.")

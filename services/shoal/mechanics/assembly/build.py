@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -23,6 +24,7 @@ from shoal.mechanics.numerics.tile import index, stacked
 from shoal.mechanics.reach import span
 from shoal.mechanics.rubbing import Rubbing
 from shoal.scene import GROUND, Distance, Scene
+from shoal.scene.formula import Node
 from shoal.scene.signals import following
 
 
@@ -46,11 +48,13 @@ def with_start(model: Model, scene: Scene, lanes: int) -> Model:
     )
 
 
-def build(scene: Scene, lanes: int = 1, horizon: float = 0.0, placement: Placement | None = None) -> Model:
+def build(
+    scene: Scene, lanes: int = 1, horizon: float = 0.0, placement: Placement | None = None, probes: Sequence[Node] = ()
+) -> Model:
     """Assemble the model of a scene whose numbers may be arrays over lanes. Raises InputError.
 
     horizon [s]: functions of time are fitted up to it, and at least up to the end of the scene's duration. placement:
-    that of the scene, if it is known.
+    that of the scene, if it is known. probes: formulas that are looked at beside those that loads follow.
     """
     progress.begin()
     placement = placement or place(scene)
@@ -59,6 +63,7 @@ def build(scene: Scene, lanes: int = 1, horizon: float = 0.0, placement: Placeme
     rows = RowAllocator(len(placement.positions))
     masses = Masses(scene, placement, rows)
     loads, contacts = Loads(scene, placement, rows, horizon), Contacts(scene, placement, rows)
+    probed = tuple(loads.signals.strength("outputs", node) for node in probes)
     gaps = contacts.gaps(placement.terms.pressed)
     if gaps.size and loads.rubbing:
         raise InputError(
@@ -120,6 +125,8 @@ def build(scene: Scene, lanes: int = 1, horizon: float = 0.0, placement: Placeme
         rubbing=_rubbing(loads, placement.terms.pressed),
         signals=loads.followed(),
         signal_fields=tuple(following(stated)),
+        signal_names=tuple(loads.signals.names),
+        probed=probed,
         signal_angles=stacked(loads.signals.measures.angles),
         method=principle.method(scene.solver.acceleration),
         baumgarte=scene.solver.baumgarte,

@@ -29,6 +29,8 @@ class SignalLoads:
     """Collects what loads follow, and the loads that do.
 
     fit: returns the number of a function of time, from its field and itself
+    Attributes:
+        names: of the signals that are numbers, by constant; empty of others
     """
 
     def __init__(self, measures: Measures, torques: Measures, fit: Callable[[str, Any], int]) -> None:
@@ -39,6 +41,7 @@ class SignalLoads:
         self._rows: dict[str, list[int]] = {"position": [], "velocity": []}
         self._functions: list[int] = []
         self._constants: list[Number] = []
+        self.names: list[str] = []
         self._code: list[tuple[int, list[Operand]]] = []
         self._known: dict[Node, Operand] = {}
 
@@ -111,6 +114,7 @@ class SignalLoads:
     def _entered(self, field: str, node: Node) -> Operand:
         if isinstance(node, float | Constant):
             value = self.scene.signals[node.name] if isinstance(node, Constant) else node
+            self.names.append(node.name if isinstance(node, Constant) else "")
             self._constants.append(value.number if isinstance(value, Function) else value)
             return "constant", len(self._constants) - 1
         if isinstance(node, Measure):
@@ -135,6 +139,7 @@ class SignalLoads:
         rate = "velocity", len(self._rows["velocity"]) - 1
         if np.ndim(size) == 0 and size == 1.0:
             return rate
+        self.names.append("")
         self._constants.append(size)
         self._code.append((tape.MULTIPLY, [rate, ("constant", len(self._constants) - 1)]))
         return "result", len(self._code) - 1

@@ -5,6 +5,7 @@ from shoal.terminal.tables.installation import doctor_table
 from shoal.terminal.tables.motions import (
     comparison_table,
     equilibrium_table,
+    linear_table,
     modes_table,
     reactions_table,
     selection_table,
@@ -19,6 +20,7 @@ __all__ = [
     "doctor_table",
     "equilibrium_table",
     "estimate_table",
+    "linear_table",
     "modes_table",
     "reactions_table",
     "response_table",

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from shoal.mechanics.analysis.equilibrium import Equilibrium
     from shoal.mechanics.analysis.joint_reactions import Reactions
     from shoal.mechanics.analysis.modes import Modes
+    from shoal.mechanics.linear_model import LinearModel
     from shoal.scene import Scene
     from shoal.selection import Selection
     from shoal.trajectory import Array, Trajectory
@@ -225,6 +226,29 @@ def _exerted(title: str, headings: list[str], reactions: Reactions, values: Arra
         errors = (f"{getattr(joint, f'{part}_error'):.1e}" for part in parts)
         table.add_row(name, joint.kind, *(f"{value:.6g}" for value in row), *errors, "yes" if joint.unique else "no")
     screen.out.print(table)
+
+
+def linear_table(found: LinearModel) -> None:
+    """Poles, slowest first, with the names of states, inputs and outputs; --json and --out have the matrices."""
+    title = f"{found.scene.name}: linear model about the {found.about}"
+    table = screen.table(title, "pole [1/s]", "frequency [Hz]", "damping ratio", "kind")
+    for pole in (one for one in found.poles.tolist() if one.imag >= 0.0):
+        size = abs(pole)
+        kind = "integrates" if not size else "grows" if pole.real > 0.0 else "oscillates" if pole.imag else "decays"
+        ratio = f"{-pole.real / size + 0.0:.6g}" if size else "-"
+        table.add_row(_complex(pole), f"{abs(pole.imag) / (2 * np.pi):.6g}", ratio, kind)
+    screen.out.print(table)
+    for what in ("states", "inputs", "outputs"):
+        screen.say(f"{what}: {', '.join(getattr(found, what))}")
+    if found.zeros is not None:
+        screen.say(
+            f"zeros [1/s]: {', '.join(_complex(one) for one in found.zeros.tolist() if one.imag >= 0.0) or 'none'}"
+        )
+    screen.findings(found)
+
+
+def _complex(value: complex) -> str:
+    return f"{value.real:.6g}" + (f" +- {value.imag:.6g}j" if value.imag else "")
 
 
 def modes_table(modes: Modes | Campbell) -> None:
