@@ -73,6 +73,7 @@ STUDIES: dict[str, Study] = {
     "random-chains-tolerance": Study("random_space --seeds 0:200 --tolerance 1e-3", ("validation.md",), counts=True),
     "random-linkages": Study("random_space --kind linkages --seeds 0:60", ("validation.md",), counts=True),
     "random-directors": Study("random_space --kind directors --seeds 0:60", ("validation.md",), counts=True),
+    "random-contacts": Study("random_contacts --seeds 0:30", ("contact-checks.md",), counts=True),
     "random-bent": Study("random_space --kind bent --seeds 0:20 --tolerance 1e-3", ("validation.md",), counts=True),
     "random-frames": Study("random_space --kind frames --seeds 0:24 --tolerance 1e-3", ("validation.md",), counts=True),
 }
@@ -121,10 +122,10 @@ def main(arguments: list[str]) -> None:
     chosen = parser.parse_args(arguments)
     known = json.loads(MEASURED.read_text(encoding="utf-8"))
     for name in chosen.only:
-        study = STUDIES[name]
+        study, before = STUDIES[name], known.get(name, {"date": ""})
         if chosen.list:
-            sys.stdout.write(f"{name}: {study.command}; {known[name]}\n")
-        elif known[name]["date"] < chosen.since and ("DATA" not in study.command or chosen.data):
+            sys.stdout.write(f"{name}: {study.command}; {before}\n")
+        elif before["date"] < chosen.since and ("DATA" not in study.command or chosen.data):
             sys.stderr.write(f"== {name}: {study.command}\n")
             _renew(name, study, chosen.data)
 

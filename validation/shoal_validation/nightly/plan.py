@@ -8,7 +8,7 @@ from functools import partial
 
 from shoal.errors import InputError
 
-from shoal_validation.nightly import maps, own, uncertain
+from shoal_validation.nightly import drawn, maps, own, uncertain
 from shoal_validation.nightly.line import Line
 from shoal_validation.nightly.measure import Measured, angles, motion, selection
 from shoal_validation.nightly.methods import FLEXIBLE, RIGID, Method
@@ -28,7 +28,7 @@ SEARCHES = ("least-squares", "iafsa")
 
 def plan(only: str | None = None, quick: bool = False) -> list[Line]:
     """The lines of a night, of one problem or scene of the library if so asked. Raises InputError."""
-    lines = [*_motions(), *_identifications(), *maps.lines(), *uncertain.lines(), *own.lines()]
+    lines = [*_motions(), *_identifications(), *maps.lines(), *drawn.lines(), *uncertain.lines(), *own.lines()]
     names = dict.fromkeys(line.problem for line in lines)
     if only is not None and only not in names and (only := own.OWN + (asked := only)) not in names:
         raise InputError(f"--only: no problem {asked!r}; there are {', '.join(names)}")

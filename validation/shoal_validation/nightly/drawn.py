@@ -1,0 +1,33 @@
+"""The line of machines with contacts drawn at random: none may be wrong and called right."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from shoal_validation.benchmarks.timing import undisturbed
+from shoal_validation.nightly.line import Line
+from shoal_validation.nightly.measure import Measured
+from shoal_validation.random_contacts.study import WRONG, judged
+
+SEEDS = range(24)
+LEAST = len(SEEDS) // 2
+"""Machines that must be right, as a night in which all are refused guards nothing."""
+
+
+def lines() -> Iterator[Line]:
+    """One line."""
+    reason = "no machine may be further from the judge than three times its estimated error"
+    source = "Newton's and Euler's equations, every mode of contacts tried"
+    yield Line("random/contacts", "gauss", "default", 0.0, reason, wrong, source, "machines", quick=False, noise=0.5)
+
+
+def wrong() -> Measured:
+    """Return how many machines are wrong and called right, as the error; failed if few are judged right."""
+    seconds, found = undisturbed(lambda: [judged(seed) for seed in SEEDS])
+    verdicts = [one.verdict for one in found]
+    if verdicts.count("right") < LEAST:
+        return Measured("failed", np.nan, seconds, f"only {verdicts.count('right')} of {len(found)} are right")
+    named = "; ".join(str(one).strip() for one in found if one.verdict == WRONG)
+    return Measured("ok", float(verdicts.count(WRONG)), seconds, named)
