@@ -47,6 +47,7 @@ def on_page_content(html: str, **_: Any) -> str:
 def findings() -> str:
     """Return the tables of all kinds of findings, one for each analysis."""
     from shoal.identification import findings as identification
+    from shoal.imported import findings as imported
     from shoal.mechanics import findings as motions
     from shoal.mechanics.analysis import findings as statics
     from shoal.mechanics.analysis import modes_findings as modes
@@ -61,6 +62,7 @@ def findings() -> str:
             f"## Statics\n\n{_kinds(statics, 'status')}",
             f"## Modes and Campbell diagrams\n\n{_kinds(modes, 'status')}",
             f"## Joint reactions\n\n{_kinds(reactions, 'status')}",
+            f"## Imports\n\n{_kinds(imported, 'status')}",
         ]
     )
 

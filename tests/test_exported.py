@@ -36,7 +36,7 @@ def test_an_exported_machine_is_read_back(tmp_path: Path, monkeypatch: pytest.Mo
     assert re.fullmatch(r"mjcf: its motion is within \S+e-09 m of `shoal simulate`\n", done.stderr)
     back = CliRunner().invoke(main, ["import", "andrews-squeezer.xml"])
     assert back.exit_code == 0, back.output
-    assert back.stderr.splitlines() == [
+    assert [line for line in back.stderr.splitlines() if line.startswith("left out: ")] == [
         "left out: geoms: 15 that are only seen",
         "left out: <option>: integrator, iterations, timestep, tolerance (from line 4)",
         "left out: <flag>: energy (from line 5)",

@@ -9,6 +9,7 @@ from types import ModuleType
 import pytest
 from shoal.findings import Finding, Kind, Severity, steps, worst_implied
 from shoal.identification import findings as identification
+from shoal.imported import findings as imported
 from shoal.mechanics import findings as motions
 from shoal.mechanics.analysis import findings as statics
 from shoal.mechanics.analysis import modes_findings as modes
@@ -19,7 +20,7 @@ from shoal.mechanics.analysis.reaction_findings import ReactionsStatus
 from shoal.response import findings as response
 from shoal.trajectory import Status
 
-MODULES = [identification, motions, statics, modes, reactions, response]
+MODULES = [identification, motions, statics, modes, reactions, response, imported]
 STATUSES = [(motions, Status), (statics, EquilibriumStatus), (modes, ModesStatus), (reactions, ReactionsStatus)]
 
 

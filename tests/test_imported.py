@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -137,6 +138,26 @@ def test_the_command_writes_a_scene_and_lists_the_rest(tmp_path: Path) -> None:
     assert "left out: actuators: 1" in done.stderr
     assert done.stdout.strip() == str(out)
     assert Scene.parse(yaml.safe_load(out.read_text())).dimensions == 3
+
+
+def test_the_command_reports_what_became_what(tmp_path: Path) -> None:
+    """Every body, joint and equality has a row; findings say what the rest changes; the same as one JSON object."""
+    path, out = written(tmp_path, LOOP, "loop.xml"), tmp_path / "made.yaml"
+    done = CliRunner().invoke(main, ["import", str(path), "--out", str(out), "--json"])
+    assert done.exit_code == 0, done.stderr
+    report = json.loads(done.stdout)
+    became = {row["element"]: row["became"] for row in report["rows"]}
+    assert became["body b"] == "bodies.b (rigid-body)"
+    assert became["joint ja"] == "joints.ja (revolute)"
+    assert became["equality close"] == "joints.close (spherical)"
+    assert became["actuators"] == became["sensors"] == ""
+    remarks = {row["element"]: row["remark"] for row in report["rows"]}
+    assert remarks["joint ja"] == "coulomb 0.01, armature 0.02, stops -1.571 to 1.571"
+    codes = [one["code"] for one in report["findings"]]
+    assert codes == ["file-forces-left-out", "file-contacts-left-out", "file-parts-without-motion", "file-leaves-open"]
+    told = CliRunner().invoke(main, ["import", str(path), "--out", str(out)])
+    assert "joints.close (spherical)" in told.stderr
+    assert "file-contacts-left-out: Shapes of the file that touch are no contacts of the scene" in told.stderr
 
 
 def test_what_mujoco_warns_of_is_a_note(tmp_path: Path, recwarn: pytest.WarningsRecorder) -> None:

@@ -15,6 +15,7 @@ from shoal.errors import check_trusted
 from shoal.ports import PORTS
 
 if TYPE_CHECKING:
+    from shoal.imported import Imported
     from shoal.requests.export import Export
     from shoal.requests.fmu import Fmu
 
@@ -80,12 +81,14 @@ def export(asked: Export, out: Out) -> None:
     "--argument", "stated", multiple=True, metavar="NAME=VALUE", help="An argument of the macros of a file (xacro)."
 )
 @options.out(".yaml", otherwise="; else the file's name")
-def import_scene(file: Path, partial: bool, root: Any, stated: tuple[str, ...], out: Out) -> None:
-    """Write the machine of FILE (URDF, or MuJoCo's MJCF) as a scene. What has no counterpart is listed on stderr."""
+@options.as_json
+def import_scene(file: Path, partial: bool, root: Any, stated: tuple[str, ...], out: Out, as_json: bool) -> None:
+    """Write the machine of FILE (URDF, or MuJoCo's MJCF) as a scene. What became what is listed on stderr."""
     import yaml
 
     from shoal.errors import InputError
     from shoal.imported import read
+    from shoal.terminal import screen, tables
     from shoal.whole import whole
 
     if wrong := next((one for one in stated if "=" not in one), None):
@@ -98,6 +101,17 @@ def import_scene(file: Path, partial: bool, root: Any, stated: tuple[str, ...], 
     path = out or Path(f"{found.scene['name']}.yaml")
     with whole(path) as part:
         part.write_text(yaml.safe_dump(found.scene, sort_keys=False), encoding="utf-8")
+    report = {
+        "status": "ok", "file": str(path), "rows": [one._asdict() for one in found.rows], "left_out": found.left_out,
+        "missing": found.missing, "notes": found.notes, "warnings": found.warnings,
+        "findings": [one.to_json() for one in found.findings],
+    }  # fmt: skip
+    screen.show(report, as_json, lambda: _show_import(found, path, tables))
+
+
+def _show_import(found: Imported, path: Path, tables: Any) -> None:
+    """Print the table and the lines of an import on stderr, and the path of the scene on stdout."""
+    tables.import_table(found.rows)
     for line in found.left_out:
         mark = "; the scene is another machine" if line in found.missing else ""
         click.echo(f"left out: {line}{mark}", err=True)
@@ -105,6 +119,9 @@ def import_scene(file: Path, partial: bool, root: Any, stated: tuple[str, ...], 
         click.echo(f"note: {line}", err=True)
     for line in found.warnings:
         click.echo(f"note: MuJoCo says: {line}", err=True)
+    for one in found.findings:
+        if one.severity != "note":
+            click.echo(f"{one.code}: {one.kind.meaning}", err=True)
     click.echo(path)
 
 

@@ -15,18 +15,19 @@ from shoal.scene import GROUND
 
 def add_actuators(source: Source, parts: Parts) -> None:
     """Adds the forces [N] and torques [N m] of actuators that are constant; a line with the number of the others."""
-    left = 0
+    left = []
     # nu counts control signals, of which an actuator may have several or none.
     count = len(source.model.actuator_trntype)
     names = source.called(source.mujoco.mjtObj.mjOBJ_ACTUATOR, count, "actuator")
     for number, name in enumerate(names):
         load = _load(source, number)
         if load is None:
-            left += 1
+            left.append(name)
         else:
-            parts.loads[name if name not in parts.loads else f"{name}-push"] = load
+            called = name if name not in parts.loads else f"{name}-push"
+            parts.loads[called], parts.origin[f"loads.{called}"] = load, f"actuator {name}"
     if left:
-        parts.left_out.append(f"actuators: {left}; what they do moves or holds the machine")
+        parts.left_out.append(f"actuators: {len(left)}; {', '.join(left)} move or hold nothing")
 
 
 def _load(source: Source, number: int) -> dict[str, Any] | None:

@@ -36,7 +36,8 @@ def add_equalities(source: Source, parts: Parts) -> None:
         if joint is None:
             parts.miss(what)
         else:
-            parts.joints[name if name not in parts.joints else f"loop-{name}"] = joint
+            called = name if name not in parts.joints else f"loop-{name}"
+            parts.joints[called], parts.origin[f"joints.{called}"] = joint, f"equality {name}"
 
 
 def _coupled(source: Source, number: int) -> str:

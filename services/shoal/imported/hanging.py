@@ -70,6 +70,7 @@ def _chain(source: Source, body: int, axes: Axes, parts: Parts) -> None:
         owner = source.names[body] if last else f"{name}-link"
         if not last:
             parts.between.add(owner)
+            parts.origin[owner] = f"body {source.names[body]}"
             parts.bodies[owner] = light(source, body)
             parts.initial[owner] = initial(source, body, joints=number + 1)
         place = source.data.xanchor[one] if kind != kinds.mjJNT_SLIDE else source.data.xpos[body]

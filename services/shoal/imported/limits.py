@@ -44,6 +44,7 @@ def add_ropes(source: Source, number: int, name: str, sides: dict[str, Any], par
     for keeps, length in (("at-most", high), ("at-least", low)):
         if length > 0.0:
             parts.joints[f"{name}-{keeps}"] = {"kind": "distance", **sides, "keeps": keeps, "length": length}
+            parts.origin[f"joints.{name}-{keeps}"] = f"tendon {name}"
 
 
 def note(parts: Parts) -> list[str]:

@@ -45,7 +45,8 @@ def add_loops(file: Path, source: Source, loops: Iterable[Loop], parts: Parts) -
             parts.miss(f"{one.element}: closes a loop that is open by {gap:.3g} m in the pose of the file")
             continue
         places = {"first": source.at(bodies[0], first.place), "second": source.at(bodies[1], second.place)}
-        parts.joints[one.name if one.name not in parts.joints else f"loop-{one.name}"] = places | made
+        called = one.name if one.name not in parts.joints else f"loop-{one.name}"
+        parts.joints[called], parts.origin[f"joints.{called}"] = places | made, str(one.element)
 
 
 def _of_ground(source: Source, body: int, pose: Pose) -> Pose:

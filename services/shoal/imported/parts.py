@@ -14,6 +14,9 @@ class Parts:
     initial: dict[str, Any] = field(default_factory=dict)
     joints: dict[str, Any] = field(default_factory=dict)
     loads: dict[str, Any] = field(default_factory=dict)
+    contacts: dict[str, Any] = field(default_factory=dict)
+    origin: dict[str, str] = field(default_factory=dict)
+    """The element of the file of what has another name in the scene, by its path there (of bodies their name)."""
     left_out: list[str] = field(default_factory=list)
     """A line for everything that has no counterpart."""
     missing: list[str] = field(default_factory=list)

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from shoal.errors import InputError
+from shoal.findings import Finding
 from shoal.imported import limits
 from shoal.imported.absent import absent
 from shoal.imported.actuators import add_actuators
@@ -20,6 +21,7 @@ from shoal.imported.audit import MJCF, URDF, constraints, unread
 from shoal.imported.axes import Axes
 from shoal.imported.bodies import initial, is_mass, mass, rigid
 from shoal.imported.equalities import add_equalities
+from shoal.imported.findings import findings
 from shoal.imported.hanging import hang
 from shoal.imported.loops import add_loops
 from shoal.imported.markup import XmlElement, parse, with_includes
@@ -29,6 +31,7 @@ from shoal.imported.rounding import numbers
 from shoal.imported.source import Source
 from shoal.imported.springs import add_resistance
 from shoal.imported.switches import switch_off
+from shoal.imported.table import Row, rows
 from shoal.imported.tendons import add_tendons
 from shoal.imported.urdf import Robot, Root, urdf_robot
 from shoal.scene import GROUND, Scene
@@ -40,7 +43,7 @@ class Imported:
 
     left_out: a line for everything that has no counterpart; missing: those of them that hold bodies, without which the
     scene has other degrees of freedom than the file: another machine; notes: assumptions where the file is silent;
-    warnings: those of MuJoCo
+    warnings: those of MuJoCo; rows: what became what
     """
 
     scene: dict[str, Any]
@@ -48,6 +51,12 @@ class Imported:
     missing: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+    rows: tuple[Row, ...] = ()
+
+    @property
+    def findings(self) -> list[Finding]:
+        """Return what is not in the scene, by what that changes, and what was assumed."""
+        return findings(self.left_out, self.missing, self.notes)
 
 
 @dataclass(frozen=True)
@@ -98,7 +107,9 @@ def read(file: Path, root: Root | None = None, arguments: Mapping[str, str] | No
     scene = _scene(source, parts, re.sub(r"[^A-Za-z0-9_-]", "-", file.stem))
     _count_angles(scene, parts.away, str(file))
     notes += limits.note(parts)
-    return Imported(scene, tuple(parts.left_out), tuple(parts.missing), tuple(notes), loaded.warnings)
+    return Imported(
+        scene, tuple(parts.left_out), tuple(parts.missing), tuple(notes), loaded.warnings, tuple(rows(source, parts))
+    )
 
 
 def _mjcf(mujoco: Any, file: Path, root: XmlElement) -> Robot:
@@ -164,6 +175,7 @@ def _scene(source: Source, parts: Parts, name: str) -> dict[str, Any]:
         "bodies": parts.bodies,
         "joints": parts.joints,
         **({"loads": parts.loads} if parts.loads else {}),
+        **({"contacts": parts.contacts} if parts.contacts else {}),
         "markers": _markers(source, parts),
         "initial": parts.initial,
     }

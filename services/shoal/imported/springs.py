@@ -76,6 +76,7 @@ def _add_spring(source: Source, one: int, made: dict[str, Any], parts: Parts) ->
     if "elastic" in found and made["kind"] == "slider":
         parts.left_out.append(f"joint {name}: the part {found.pop('elastic')} of its spring")
     if found and _is_simple(source, one, made):
+        parts.origin[f"loads.{name}-spring"] = f"joint {name}"
         parts.loads[f"{name}-spring"] = _spring(source, one, made, parts.away) | found
     elif found:
         told = " and ".join(f"{word} {value}" for word, value in found.items())

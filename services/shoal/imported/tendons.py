@@ -28,10 +28,13 @@ def add_tendons(source: Source, parts: Parts) -> None:
         add_ropes(source, number, name, sides, parts)
         if number in lengths:
             parts.kept.add(lengths[number])
-            parts.joints[name if name not in parts.joints else f"{name}-length"] = {"kind": "distance", **sides}
+            called = name if name not in parts.joints else f"{name}-length"
+            parts.joints[called] = {"kind": "distance", **sides}
+            parts.origin[f"joints.{called}"] = f"tendon {name}"
         if acts := _law(source, number):
             load = {"kind": "spring", **sides, **acts, "length": float(low)}
-            parts.loads[name if name not in parts.loads else f"{name}-tendon"] = load
+            called = name if name not in parts.loads else f"{name}-tendon"
+            parts.loads[called], parts.origin[f"loads.{called}"] = load, f"tendon {name}"
 
 
 def _tell(source: Source, number: int, name: str, parts: Parts) -> None:

@@ -109,6 +109,11 @@ def _shared(words: list[int], sizes: list[list[Measurement]], room: int) -> list
 def table(title: str, *headings: str) -> Table:
     """An empty table; its title is printed at once, so that it is not folded to the width of the table."""
     out.print(title, style="bold")
+    return untitled(*headings)
+
+
+def untitled(*headings: str) -> Table:
+    """An empty table without a title, of which nothing is printed yet."""
     made = FittingTable(box=box.SIMPLE_HEAD, pad_edge=False)
     for index, heading in enumerate(headings):
         made.add_column(escape(heading), justify="left" if index == 0 else "right", overflow="fold")

@@ -1,7 +1,7 @@
 """Tables of 80 columns, one function for every kind of answer."""
 
 from shoal.terminal.tables.estimates import design_table, estimate_table
-from shoal.terminal.tables.installation import doctor_table
+from shoal.terminal.tables.installation import doctor_table, import_table
 from shoal.terminal.tables.motions import (
     comparison_table,
     equilibrium_table,
@@ -20,6 +20,7 @@ __all__ = [
     "doctor_table",
     "equilibrium_table",
     "estimate_table",
+    "import_table",
     "linear_table",
     "modes_table",
     "reactions_table",

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from shoal.terminal import screen
 
 if TYPE_CHECKING:
     from shoal.doctor import Check
+    from shoal.imported.table import Row
 
 
 def doctor_table(checks: list[Check]) -> None:
@@ -17,3 +19,14 @@ def doctor_table(checks: list[Check]) -> None:
         table.add_row(check.name, "ok" if check.ok else "FAILED", check.found, check.advice)
     table.columns[2].justify = table.columns[3].justify = "left"
     screen.out.print(table)
+
+
+def import_table(rows: Iterable[Row]) -> None:
+    """Print what became what, on stderr; what is left out has lines of its own."""
+    table = screen.untitled("element", "became", "remark")
+    for row in rows:
+        if row.became:
+            table.add_row(row.element, row.became, row.remark)
+    for column in table.columns:
+        column.justify = "left"
+    screen.err.print(table)
