@@ -334,6 +334,76 @@ def test_fixed_steps_keep_their_order(integrator: str, order: int) -> None:
     assert math.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.3)
 
 
+def bounced(t: float) -> float:
+    """Place under a force of 1 N below 0.1 m and of -5 N above, from rest at 0 m: 1 kg comes and goes for ever."""
+    arrives = rate = math.sqrt(0.2)
+    if t < arrives:
+        return t * t / 2
+    above = 2 * rate / 5
+    since = (t - arrives) % (above + 2 * rate)
+    if since < above:
+        return 0.1 + rate * since - 2.5 * since**2
+    return 0.1 - rate * (since - above) + (since - above) ** 2 / 2
+
+
+@pytest.mark.parametrize("integrator", ["rk4", "leapfrog", "generalized-alpha", "dop853", "radau5"])
+def test_steps_end_where_a_signal_jumps(integrator: str) -> None:
+    """All of these are exact between the jumps: nothing is lost at a jump, however long the step."""
+    times = np.linspace(0.3, 6.0, 12)
+    data = on_rail(1.0, 0.0, "1 - 6*step(slide(rail) - 0.1)")
+    data["solver"] = {"integrator": integrator, "step": 1e-2, "duration": 6.0}
+    found = simulate(Scene.parse(data), times)
+    exact = [bounced(t) for t in times]
+    assert found.points[:, 0, 0, 0] == pytest.approx(exact, abs=1e-8)
+    assert found.energy_drift[0] < 1e-8
+
+
+def test_a_saturation_costs_no_order() -> None:
+    x, errors = [0.6145868678721135, 1.06830184252287], []
+    for step in (4e-3, 2e-3):
+        solver = {"integrator": "rk4", "step": step, "duration": 1.0}
+        found = simulate(Scene.parse({**saturated(), "solver": solver}), np.array([0.6, 1.0]))
+        errors.append(float(np.max(np.abs(found.points[:, 0, 0, 0] - x))))
+    assert math.log2(errors[0] / errors[1]) == pytest.approx(4.0, abs=0.3)
+
+
+@pytest.mark.parametrize(
+    "scale", ["1 - 6*step(step(slide(rail) - 0.1) - 0.5)", "1 - 6*max(min(step(slide(rail) - 0.1), 3), 0.5) + 3*low"]
+)
+def test_switches_that_depend_on_switches(scale: str) -> None:
+    data = on_rail(1.0, 0.0, scale, signals={"low": "1 - step(slide(rail) - 0.1)"})
+    data["solver"] = {"integrator": "rk4", "step": 1e-2, "duration": 2.0}
+    found = simulate(Scene.parse(data), np.array([1.0, 2.0]))
+    assert found.points[:, 0, 0, 0] == pytest.approx([bounced(1.0), bounced(2.0)], abs=1e-8)
+
+
+def test_jumps_of_time_and_of_the_state_meet() -> None:
+    """A switch whose argument jumps with time is set anew there."""
+    data = on_rail(1.0, 0.0, "step(aim - slide(rail))", signals={"aim": "-1 + 2*step(t - 0.5)"})
+    data["solver"] = {"integrator": "rk4", "step": 0.03, "duration": 1.5}
+    found = simulate(Scene.parse(data), np.array([0.5, 1.5]))
+    assert found.points[:, 0, 0, 0] == pytest.approx([0.0, 0.5], abs=1e-12)
+
+
+def test_lanes_that_switch_are_run_one_by_one() -> None:
+    scene = Scene.parse(on_rail(1.0, 0.0, "1 - jump*step(slide(rail) - 0.1)", signals={"jump": 6.0}))
+    found = simulate(scene, np.array([1.0, 2.0]), {"signals.jump": np.array([6.0, 2.0])})
+    assert found.points[:, 0, 0, 0] == pytest.approx([bounced(1.0), bounced(2.0)], abs=1e-10)
+    alone = simulate(scene.with_values({"signals.jump": 2.0}), np.array([1.0, 2.0]))
+    assert np.array_equal(found.points[..., 1], alone.points[..., 0])
+
+
+def test_a_relay_that_slides_along_its_line_chatters() -> None:
+    """It reaches the line x + v = 0 at 1 - 5 t - 2.5 t^2 = 0, and both laws lead back there."""
+    data = on_rail(1.0, 0.0, "-5*(2*step(slide(rail) + slide_rate(rail)) - 1)")
+    data["initial"] = {"mass": {"position": [1.0, 0.0]}}
+    for integrator in ("rk4", "dop853"):
+        found = simulate(Scene.parse({**data, "solver": {"integrator": integrator, "duration": 1.0}}), np.array([1.0]))
+        assert not found.ok
+        assert found.findings[0].kind.code == "chatters"
+        assert found.findings[0].numbers["time"] == pytest.approx((math.sqrt(35.0) - 5.0) / 5.0, abs=1e-6)
+
+
 @pytest.mark.parametrize("make", [cart_pole, two_link, saturated, filtered, in_space])
 def test_implicit_integrators_follow_signals(make: Any) -> None:
     """Newton's method takes their exact derivatives: where all is linear, one change and one to see that it was all."""

@@ -59,6 +59,12 @@ TOO_MANY_EVENTS = _rejects(
     "Contacts strike, open, stick and slip ever again, without an end.",
     "a shorter solver.duration, or another restitution",
 )
+CHATTERS = _rejects(
+    "chatters",
+    Status.FAILED,
+    "Signals switch to and fro without end, as a relay that holds a machine on its switching line.",
+    "tanh(x/width) in place of a step, or a dead band",
+)
 IMPACT_GAINS = _rejects(
     "impact-gains-energy",
     Status.ENERGY,

@@ -22,7 +22,7 @@ from numba import carray, njit, typeof, types
 from shoal.compile import function_pointers, simd, structures
 from shoal.compile.pointers import pointer, raw_type
 from shoal.compile.structures import Reference
-from shoal.mechanics import constraints, gaps, kernels
+from shoal.mechanics import constraints, gaps, kernels, signals, switch_events
 from shoal.mechanics import contact_events as events
 from shoal.mechanics.derived import derive
 from shoal.mechanics.dynamics import Work, loaded, remember
@@ -39,7 +39,10 @@ from shoal.mechanics.marched import (
     NOW,
     NUMBER,
     ROOM,
+    ROW,
     SAMPLE,
+    SINCE,
+    SWITCH,
     TAKEN,
     WHOLE,
     Frame,
@@ -51,6 +54,7 @@ from shoal.mechanics.marched import (
 )
 from shoal.mechanics.model import Arrays, seen
 from shoal.mechanics.numerics.tile import Array, Index, Tile
+from shoal.mechanics.signals import CHATTERS, switches_held
 
 ASSEMBLY = 30
 """Iterations that may assemble a mechanism whose stated start is only roughly consistent."""
@@ -60,6 +64,8 @@ CHECK_EVERY = 4
 """An adaptive run is looked at every so many steps, each of which is worth a dozen looks."""
 PAUSE = 0.1
 """After about so long [s] the compiled loop returns: unnoticed by who waits, and beside it the return takes no time."""
+CHATTER = 100.0
+"""So many steps in a row within one that would else be taken, each ended by a switch, are no motion (OpenModelica)."""
 AIMS = 3
 """At most so often a step is aimed at an event: its dense output is of lower order than its end."""
 GROWTH = 4.0
@@ -86,7 +92,8 @@ class March:
         structures.write(arrays.storage, arrays)
         structures.write(frame.room.storage, frame.room)
         event = _first_event(frame) if arrays.gaps.size > 0 and len(frame.tile) == 1 else 0
-        structures.write(self._storage, frame._replace(arrays=arrays, first_event=event))
+        switch = _first_switch(frame) if switches_held(frame.arrays, frame.tile) else 0
+        structures.write(self._storage, frame._replace(arrays=arrays, first_event=event, first_switch=switch))
         width = len(frame.tile)
         if width not in _LOOPS:
             _LOOPS[width] = function_pointers.address(loop, (frame_type(frame),))
@@ -141,6 +148,17 @@ def _first_event(frame: Frame) -> int:
     return kernels.address(("first event", len(frame.tile)), lambda: event_kernel(frame))
 
 
+def switch_kernel(frame: Frame) -> kernels.Kernel:
+    """Return the kernel that finds the first switch of signals within a step, with its types."""
+    parts = frame.arrays.followed, frame.scheme, seen(frame.arrays), frame.room, frame.own
+    kinds = typeof(frame.tile), *(Reference(raw_type(typeof(part))) for part in parts), types.float64, types.float64
+    return switch_events.first, kinds
+
+
+def _first_switch(frame: Frame) -> int:
+    return kernels.address(("first switch", len(frame.tile)), lambda: switch_kernel(frame))
+
+
 def march(*arguments: Any) -> Marched:
     """March once, with the arguments of `framed`."""
     ready = March(framed(*arguments))
@@ -178,6 +196,14 @@ def loop(frame):  # type: ignore[no-untyped-def]
             _sample(tile, scheme, m, w, k, marker_rows, times[sample] - now, taken, slack, record.samples, sample)
             _keep_contacts(tile, m, w, record, sample, False)
             sample += 1
+        if own[SWITCH] > 0.0:
+            own[SWITCH] = 0.0
+            signals.follow(tile, m, w, now, w.z, w.zdot, w.z, signals.TURN)
+            _leave_halt(tile, scheme, m, w, k, now, tolerance, record.energy_scale)
+            own[SINCE] = now if own[ROW] == 0.0 else own[SINCE]
+            own[ROW] += 1.0
+            if own[ROW] >= CHATTER:
+                _end_chatter(tile, m, w, now)
         if own[EVENT] > 0.0:
             own[EVENT] = 0.0
             _leave_event(tile, scheme, m, w, k, now, tolerance, record.energy_scale)
@@ -189,6 +215,8 @@ def loop(frame):  # type: ignore[no-untyped-def]
         if halt <= last and now == halts.times[halt]:
             halt += 1
             w.until[0] = np.nextafter(halts.times[halt], 0.0) if halt <= last else np.inf
+            if frame.first_switch != 0:
+                signals.follow(tile, m, w, now, w.z, w.zdot, w.z, signals.SETTLE)
             _leave_halt(tile, scheme, m, w, k, now, tolerance, record.energy_scale)
         target = ending if free else min((number + 1) * step, ending)
         halted = halt <= last and halts.times[halt] <= target + snap
@@ -197,7 +225,10 @@ def loop(frame):  # type: ignore[no-untyped-def]
         rest = step if whole and not (free or halted) else target - now
         sampling = sample < len(times) and (free or times[sample] < now + step * (1 - 1e-9))
         begin = now
-        taken = _advance(tile, scheme, m, w, k, halts, frame.first_event, now, rest, snap, tolerance, sampling)
+        finders = frame.first_event, frame.first_switch
+        taken = _advance(tile, scheme, m, w, k, halts, finders, now, rest, snap, tolerance, sampling)
+        if own[SWITCH] == 0.0 or now + taken - own[SINCE] > step:
+            own[ROW] = 0.0
         if m.gaps.size > 0 and len(tile) > 1 and events.approach(tile, m, w, taken):
             own[DONE] = 1.0
             break
@@ -236,6 +267,8 @@ def _begin(tile: Tile, m: Arrays, w: Work, k: LoopRoom, record: Marched, marker_
     """Make the start consistent and keep it, find its acceleration, its energy and the sides of the directions."""
     end = m.unknowns * len(tile)
     kernels.settle(tile, m, w, 0.0, tolerance, ASSEMBLY)
+    if m.table.signals != 0:
+        signals.follow(tile, m, w, 0.0, w.z, w.zdot, w.z, signals.SETTLE)
     for i in range(end):
         record.begin[i], record.begin[end + i] = w.z[i], w.zdot[i]
     kernels.acceleration(tile, m, w, 0.0, w.z, w.zdot, tolerance, w.a)
@@ -348,7 +381,7 @@ def _advance(
     w: Work,
     k: LoopRoom,
     halts: Halts,
-    first_event: int,
+    finders: tuple[int, int],
     now: float,
     rest: float,
     snap: float,
@@ -357,23 +390,24 @@ def _advance(
 ) -> float:
     """One step of at most `rest` [s], shorter where it would leap over a part of a force law; returns its length.
 
-    first_event: address of `event_kernel`. keep: whether the motion inside it will be needed.
+    finders: addresses of `event_kernel` and `switch_kernel`. keep: whether the motion inside it will be needed.
     """
     end = m.unknowns * len(tile)
     watched, touches = halts.marks.size > 0, m.gaps.size > 0 and len(tile) == 1
-    if keep or watched or touches or (scheme.adaptive and loaded(m)):
+    first_event, first_switch = finders
+    if keep or watched or touches or first_switch != 0 or (scheme.adaptive and loaded(m)):
         for i in range(end):
             k.past[i], k.past[end + i], k.past[2 * end + i] = w.z[i], w.zdot[i], w.a[i]
     if watched:
         derive(tile, m.derived, w.z, m.unknowns, m.force_rows, False)
         elongations(tile, m.forces, w.z, w.memory, w.element, k.elongation)
-    taken, aims = float(rest), 0
+    taken, aims, turns = float(rest), 0, False
     if touches:
         events.proceed(tile, m, w)
     while True:
         asked = taken
         taken = advance(tile, scheme, m, w, now, asked)
-        again, aims = taken, aims if taken >= asked else 0
+        again, aims, turns = taken, aims if taken >= asked else 0, turns and taken >= asked
         if watched and taken > snap:
             derive(tile, m.derived, w.z, m.unknowns, m.force_rows, False)
             if leapt(tile, m.forces, halts, k.elongation, w.z, w.memory, w.element):
@@ -388,7 +422,15 @@ def _advance(
                     again, aims = found * taken, 1
             elif aims <= AIMS:
                 again, aims = min(taken + events.miss(tile, m, w, taken), rest), aims + 1
+        if first_switch != 0 and again == taken and not turns:
+            power = w.power[0]  # as for contacts
+            found = function_pointers.ask(first_switch, (tile, m.signals, scheme, m, w, k, now, taken))
+            w.power[0] = power
+            if found <= 1.0:
+                again, turns = max(found * taken, snap), True
         if again == taken:
+            if first_switch != 0:
+                k.progress[SWITCH] = 1.0 if turns else 0.0
             if touches:
                 k.progress[EVENT] = 1.0 if aims > 0 else 0.0
             return taken  # type: ignore[no-any-return]
@@ -398,6 +440,16 @@ def _advance(
             events.begin(tile, m, w)
         restart(scheme)
         taken = again
+
+
+@njit(cache=True, error_model="numpy")
+def _end_chatter(tile: Tile, m: Arrays, w: Work, now: float) -> None:
+    """End a motion in which signals switch for ever within one step."""
+    for lane in range(len(tile)):
+        if w.gauss.ended[lane] < 0.0:
+            w.gauss.ended[lane], w.gauss.ended[2 * len(tile) + lane] = now, CHATTERS
+    for i in range(m.unknowns * len(tile)):
+        w.z[i] = np.nan
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)

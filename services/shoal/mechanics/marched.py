@@ -19,12 +19,12 @@ from shoal.mechanics.numerics.tile import Array, Index, Tile
 
 TURN = 2.0 * np.pi
 
-BEGUN, DONE, ROOM, NOW, ENDING, TAKEN, WHOLE, NUMBER, CUTS, SAMPLE, HALT, EVENT = range(12)
+BEGUN, DONE, ROOM, NOW, ENDING, TAKEN, WHOLE, NUMBER, CUTS, SAMPLE, HALT, EVENT, SWITCH, ROW, SINCE = range(15)
 """Progress of the loop: whether it has begun and is done; after how many more steps it returns; the time that it has
 reached and at which it ends [s]; the length of the last step [s], and whether that led to a whole step of a fixed
 length; the numbers of whole steps, of others, of samples and of halts so far; and whether the last step ended at an
-event of a contact."""
-PROGRESS = 12
+event of a contact, or where signals switch; and how many steps in a row did that, since when [s]."""
+PROGRESS = 15
 
 
 class Marched(NamedTuple):
@@ -131,7 +131,8 @@ class Frame(NamedTuple):
     at most that number. times: at which the marker rows are sampled [s], increasing, `samples` of them; directed:
     number of marker rows; halts: where steps end, `stops` times and `marks` marks; there forces may jump, and driven
     constraints their rates. tolerance: from which rows count as dependent. first_event: address of the kernel of
-    `contact_events.first`, 0 for machines without contacts. What is not reached stays nan in the record.
+    `contact_events.first`, 0 for machines without contacts; first_switch: of `switch_events.first`, 0 where no signal
+    switches. What is not reached stays nan in the record.
     """
 
     tile: Tile
@@ -151,6 +152,7 @@ class Frame(NamedTuple):
     marks: int
     tolerance: float
     first_event: int = 0
+    first_switch: int = 0
 
 
 def framed(

@@ -198,7 +198,8 @@ class Runs:
         Lanes of adaptive integrators stay together, so that neighbours take equal steps. The number of threads has no
         influence.
         """
-        if np.any(self.model.gaps.kind == DRY):  # whose contacts are closed from the start
+        switching = self.model.signals and self.model.signals.switches > 0 and not self.model.gaps.size
+        if switching or np.any(self.model.gaps.kind == DRY):  # whose contacts are closed from the start
             return [slice(k, k + 1) for k in range(lanes)]
         _, parts = tiles(lanes)
         rest = lanes % len(WIDE)

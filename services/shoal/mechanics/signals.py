@@ -21,13 +21,14 @@ from shoal.compile.structures import Reference
 from shoal.compile.vector import add, add_product, copy
 from shoal.mechanics import applied, forces, functions, tape
 from shoal.mechanics.applied import Applied
-from shoal.mechanics.derived import fold
+from shoal.mechanics.derived import derive, fold
 from shoal.mechanics.forces import Forces
 from shoal.mechanics.numerics.tile import Array, Index, Tile
 
-ACT, REMEMBER, LINEARISE, DERIVE = range(4)
+ACT, REMEMBER, LINEARISE, DERIVE, SETTLE, TURN = range(6)
 """What the kernel does: evaluate all and add the loads to the forces; count the turns of angles; evaluate all and
-`linearise`; or `linearise` what was evaluated last."""
+`linearise`; `linearise` what was evaluated last; set all switches that are held by their arguments; or turn those that
+are marked."""
 FORCE, BY_PLACE, BY_RATE = range(3)
 """What `linearise` makes of every strength."""
 BLOCKS = 3
@@ -38,7 +39,8 @@ class Signals(NamedTuple):
 
     measures: without any law. positions, velocities: rows of the state, and how many. functions: of time, by number.
     constant: (constants, lanes). code: of the tape, `size` instructions, whose results are the registers from `first`
-    on. strength: registers that loads follow, and how many. applied, torques: loads, in whose lists of functions
+    on. strength: registers that loads follow, and how many. switch: instructions that
+    switch, and how many. applied, torques: loads, in whose lists of functions
     registers stand; torques of the plane act along their measure, times the amplitude of its law.
     """
 
@@ -56,6 +58,8 @@ class Signals(NamedTuple):
     first: int
     strength: Index
     strengths: int
+    switch: Index
+    switches: int
     applied: Applied
     torques: Forces
 
@@ -68,24 +72,47 @@ def registers(signals: Signals) -> int:
 def room(signals: Any, width: int, rows: int) -> Array:
     """Return the room of the signals of a tile.
 
-    The continuous angles of measures, the registers, their adjoints, one row of power, and what `linearise` finds: the
-    blocks of every strength, then its derivatives by the constants.
+    The continuous angles of measures; whether switches are held, in every lane, their branches, marks, largest
+    arguments and margins at the beginning of the step; the registers, their adjoints, one row of power, and what
+    `linearise` finds: the blocks of every strength, then its derivatives by the constants.
     """
     if not signals:
         return np.zeros(0)
     by_strength = BLOCKS * rows + signals.constants
-    return np.zeros((signals.measures.size + 2 * registers(signals) + 1 + by_strength * signals.strengths) * width)
+    return np.zeros((_before.py_func(signals) + 2 * registers(signals) + 1 + by_strength * signals.strengths) * width)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _before(s: Signals) -> int:
+    """Rows of the room before the registers."""
+    return s.measures.size + 1 + 4 * s.switches
+
+
+SMALL = 1e-12
+"""Arguments of a switch below this part of the largest one that it has had are zero."""
+CHATTERS = -2.0
+"""Mark of a motion that ends in switches without end, beside the troubles of contacts."""
+
+
+def switches_held(arrays: Any, tile: Tile) -> bool:
+    """Return whether steps end where signals switch: of single lanes, but for machines with contacts."""
+    return bool(arrays.followed) and arrays.followed.switches > 0 and len(tile) == 1 and arrays.gaps.size == 0
+
+
+def hold(signals: Signals, own: Array) -> None:
+    """Let the switches of one lane be held from now on."""
+    own[signals.measures.size] = 1.0
 
 
 def register(signals: Signals, own: Array) -> Array:
     """Return the registers in the room of one lane, (registers,)."""
-    return own[signals.measures.size :][: registers(signals)]
+    return own[_before.py_func(signals) :][: registers(signals)]
 
 
 def feedback(signals: Signals, own: Array, rows: int) -> Array:
     """Return what `linearise` left in the room of one lane, (strengths, BLOCKS, rows)."""
     size = BLOCKS * rows * signals.strengths
-    return own[signals.measures.size + 2 * registers(signals) + 1 :][:size].reshape(signals.strengths, BLOCKS, rows)
+    return own[_before.py_func(signals) + 2 * registers(signals) + 1 :][:size].reshape(signals.strengths, BLOCKS, rows)
 
 
 def by_constants(signals: Signals, own: Array) -> Array:
@@ -108,7 +135,17 @@ def on_a_kink(signals: Signals, own: Array) -> bool:
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _registers(tile: Tile, s: Signals, own: Array) -> Array:
-    return shift(own, s.measures.size * len(tile))  # type: ignore[no-any-return]
+    return shift(own, _before(s) * len(tile))  # type: ignore[no-any-return]
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _branches(tile: Tile, s: Signals, own: Array) -> Array:
+    return shift(own, (s.measures.size + 1) * len(tile))  # type: ignore[no-any-return]
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _held(tile: Tile, s: Signals, own: Array) -> bool:
+    return own[s.measures.size * len(tile)] > 0.0  # type: ignore[no-any-return]
 
 
 @njit(cache=True, error_model="numpy")
@@ -135,7 +172,67 @@ def evaluate(tile: Tile, s: Signals, m: Any, w: Any, t: float, z: Array, zdot: A
     at += s.functions
     for k in range(s.constants):
         copy(tile, register, at + k, s.constant, k)
-    tape.run(tile, s.code, s.size, s.first, register)
+    tape.run(tile, s.code, s.size, s.first, register, _branches(tile, s, w.signals), _held(tile, s, w.signals))
+
+
+# Of a single lane:
+
+
+@njit(cache=True, error_model="numpy")
+def floor(tile: Tile, s: Signals, w: Any, number: int) -> float:
+    """Return the margin below which a switch turns: 0, or where it began if its last turn came a little early."""
+    return min(_branches(tile, s, w.signals)[3 * s.switches + number], 0.0)  # type: ignore[no-any-return]
+
+
+@njit(cache=True, error_model="numpy")
+def margin(tile: Tile, s: Signals, w: Any, number: int) -> float:
+    """Return by how much the argument of a switch is on the side on which it is held; below zero it is beyond."""
+    register, k = _registers(tile, s, w.signals), s.switch[number]
+    x = register[s.code[tape.ENTRIES * k + 1]]
+    if s.code[tape.ENTRIES * k] >= tape.MINIMUM:
+        x -= register[s.code[tape.ENTRIES * k + 2]]
+    return x if _branches(tile, s, w.signals)[number] > 0.0 else -x  # type: ignore[no-any-return]
+
+
+@njit(cache=True, error_model="numpy")
+def mark(tile: Tile, s: Signals, w: Any, number: int, turns: bool) -> None:
+    """Mark a switch as one that turns, or as none."""
+    _branches(tile, s, w.signals)[s.switches + number] = 1.0 if turns else 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def largest(tile: Tile, s: Signals, w: Any, number: int) -> float:
+    """Return the largest argument that a switch has had."""
+    return _branches(tile, s, w.signals)[2 * s.switches + number]  # type: ignore[no-any-return]
+
+
+@njit(cache=True, error_model="numpy")
+def learn(tile: Tile, s: Signals, w: Any) -> None:
+    """Keep the arguments of the switches as they are evaluated, at the beginning of a step."""
+    branch = _branches(tile, s, w.signals)
+    for number in range(s.switches):
+        now = margin(tile, s, w, number)
+        branch[2 * s.switches + number] = max(branch[2 * s.switches + number], abs(now))
+        branch[3 * s.switches + number] = now
+
+
+@njit(cache=True, error_model="numpy")
+def _settle(tile: Tile, s: Signals, m: Any, w: Any, t: float, z: Array, zdot: Array, turning: bool) -> None:
+    """Set switches by their arguments at a state, in the order in which they depend on each other.
+
+    turning: those that are marked turn, whatever their arguments, which are zero but for round-off; the others may
+    depend on them.
+    """
+    branch = _branches(tile, s, w.signals)
+    derive(tile, m.derived, z, m.unknowns, m.force_rows, False)
+    derive(tile, m.derived, zdot, m.unknowns, m.force_rows, True)
+    for number in range(s.switches):
+        evaluate(tile, s, m, w, t, z, zdot)
+        turns = margin(tile, s, w, number) < -SMALL * largest(tile, s, w, number)
+        if turns or (turning and branch[s.switches + number] > 0.0):
+            branch[number] = 1.0 - branch[number]
+    evaluate(tile, s, m, w, t, z, zdot)
+    learn(tile, s, w)
 
 
 @njit(cache=True, error_model="numpy")
@@ -158,7 +255,7 @@ def act(tile: Tile, s: Signals, register: Array, z: Array, zdot: Array, f: Array
 @njit(cache=True, error_model="numpy", forceinline=True)
 def block(tile: Tile, s: Signals, m: Any, w: Any, k: int) -> Array:
     """Return where `linearise` puts what belongs to strength k, BLOCKS times `force_rows` rows."""
-    rows = s.measures.size + 2 * (s.first + s.size) + 1 + BLOCKS * k * m.force_rows
+    rows = _before(s) + 2 * (s.first + s.size) + 1 + BLOCKS * k * m.force_rows
     return shift(w.signals, rows * len(tile))  # type: ignore[no-any-return]
 
 
@@ -180,7 +277,8 @@ def linearise(tile: Tile, s: Signals, m: Any, w: Any, z: Array, zdot: Array) -> 
         for i in range(count * width):
             adjoint[i] = 1.0 if i // width == s.strength[k] else 0.0
         act(tile, s, adjoint, z, zdot, force, power, w.element)
-        tape.reverse(tile, s.code, s.size, s.first, register, adjoint)
+        branch, held = _branches(tile, s, w.signals), _held(tile, s, w.signals)
+        tape.reverse(tile, s.code, s.size, s.first, register, branch, held, adjoint)
         for number in range(s.measures.size):
             forces.gradient(tile, s.measures, number, z, w.element)
             copy(tile, w.element, value, adjoint, 2 * number)
@@ -206,6 +304,10 @@ def linearise(tile: Tile, s: Signals, m: Any, w: Any, z: Array, zdot: Array) -> 
 def _signals(tile, s, m, w, t, z, zdot, f, part):  # type: ignore[no-untyped-def]
     if part == REMEMBER:
         forces.remember(tile, s.measures, z, w.signals)
+        return
+    if part in (SETTLE, TURN):
+        if _held(tile, s, w.signals):
+            _settle(tile, s, m, w, t, z, zdot, part == TURN)
         return
     if part != DERIVE:
         evaluate(tile, s, m, w, t, z, zdot)

@@ -1,8 +1,10 @@
 """A tape: formulas as a list of operations on registers, evaluated by one compiled interpreter for all scenes.
 
 Instruction k is (operation, a, b, c) and writes register first + k; a, b and c are registers. A register has one number
-a lane. `reverse` goes back along the tape (Griewank and Walther, Evaluating Derivatives, 2008, chapter 4): the
-derivatives of one register by all others for a few times the cost of its value.
+a lane. Of the operations that switch, from ABSOLUTE to MAXIMUM, c is the number of the switch: where switches are held,
+their branch (1 where x, or x - y, counts as not negative) decides and not the arguments. `reverse` goes back along the
+tape (Griewank and Walther, Evaluating Derivatives, 2008, chapter 4): the derivatives of one register by all others for
+a few times the cost of its value.
 """
 
 from __future__ import annotations
@@ -14,15 +16,15 @@ from shoal.compile import simd
 from shoal.mechanics.numerics.tile import Array, Index, Tile
 
 ADD, SUBTRACT, MULTIPLY, DIVIDE, MULTIPLY_ADD, NEGATE, SQUARE = range(7)
-POWER, MINIMUM, MAXIMUM, ABSOLUTE, STEP, RAMP, RISE, SINE, COSINE, TANGENT, TANH, ROOT, EXPONENTIAL, LOGARITHM = range(
-    7, 21
-)
+POWER, ABSOLUTE, STEP, MINIMUM, MAXIMUM, RISE = range(7, 13)
+SINE, COSINE, TANGENT, TANH, ROOT, EXPONENTIAL, LOGARITHM = range(13, 20)
+SWITCHES = (ABSOLUTE, STEP, MINIMUM, MAXIMUM)
 CODES = {
     "+": ADD, "-": SUBTRACT, "*": MULTIPLY, "/": DIVIDE, "neg": NEGATE, "square": SQUARE, "**": POWER, "min": MINIMUM,
-    "max": MAXIMUM, "abs": ABSOLUTE, "step": STEP, "ramp": RAMP, "rise": RISE, "sin": SINE, "cos": COSINE,
+    "max": MAXIMUM, "abs": ABSOLUTE, "step": STEP, "rise": RISE, "sin": SINE, "cos": COSINE,
     "tan": TANGENT, "tanh": TANH, "sqrt": ROOT, "exp": EXPONENTIAL, "log": LOGARITHM,
 }  # fmt: skip
-"""Operations of `formula.OPERATIONS` by their codes."""
+"""Operations of `formula.OPERATIONS` by their codes; ramp is rise between min and max."""
 ENTRIES = 4
 """Numbers of an instruction."""
 ROUND = 1e-12
@@ -30,8 +32,8 @@ ROUND = 1e-12
 
 
 @njit(cache=True, error_model="numpy")
-def run(tile: Tile, code: Index, size: int, first: int, register: Array) -> None:
-    """Evaluate `size` instructions; register: (registers, lanes). Pointers."""
+def run(tile: Tile, code: Index, size: int, first: int, register: Array, branch: Array, held: bool) -> None:
+    """Evaluate `size` instructions; register: (registers, lanes), branch: (switches, lanes). Pointers."""
     width = len(tile)
     for k in range(size):
         operation, out = code[ENTRIES * k], (first + k) * width
@@ -52,9 +54,29 @@ def run(tile: Tile, code: Index, size: int, first: int, register: Array) -> None
                 simd.store(register, out, -x)
             else:
                 simd.store(register, out, x * x)
+        elif ABSOLUTE <= operation <= MAXIMUM:
+            for lane in range(width):
+                x, y = register[a + lane], register[b + lane]
+                above = branch[c + lane] > 0.0 if held else _is_above(operation, x, y)
+                register[out + lane] = _switched(operation, x, y, above) if x == x and y == y else np.nan
         else:
             for lane in range(width):
                 register[out + lane] = _value(operation, register[a + lane], register[b + lane])
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _is_above(operation: int, x: float, y: float) -> bool:
+    """Return on which side a switch is by its arguments."""
+    return x >= (y if operation >= MINIMUM else 0.0)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _switched(operation: int, x: float, y: float, above: bool) -> float:
+    if operation == ABSOLUTE:
+        return x if above else -x
+    if operation == STEP:
+        return 1.0 if above else 0.0
+    return x if above == (operation == MAXIMUM) else y
 
 
 @njit(cache=True, error_model="numpy")
@@ -62,17 +84,8 @@ def _value(operation: int, x: float, y: float) -> float:
     value = np.nan
     if operation == POWER:
         value = x**y
-    elif operation == MINIMUM:
-        value = x if x < y or x != x else y
-    elif operation == MAXIMUM:
-        value = x if x > y or x != x else y
-    elif operation == ABSOLUTE:
-        value = abs(x)
-    elif operation == STEP:
-        value = np.nan if x != x else 1.0 if x >= 0.0 else 0.0
-    elif operation in (RAMP, RISE):
-        s = min(max(x, 0.0), 1.0) if operation == RAMP and x == x else x
-        value = s * s * s * (10.0 + s * (6.0 * s - 15.0))
+    elif operation == RISE:
+        value = x * x * x * (10.0 + x * (6.0 * x - 15.0))
     elif operation == SINE:
         value = np.sin(x)
     elif operation == COSINE:
@@ -91,10 +104,12 @@ def _value(operation: int, x: float, y: float) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def reverse(tile: Tile, code: Index, size: int, first: int, register: Array, adjoint: Array) -> None:
+def reverse(
+    tile: Tile, code: Index, size: int, first: int, register: Array, branch: Array, held: bool, adjoint: Array
+) -> None:
     """Add the derivatives by all registers to their adjoints, from those of the results; (registers, lanes) each.
 
-    register: as `run` left it. Pointers.
+    register, branch: as `run` had them. Pointers.
     """
     width = len(tile)
     for k in range(size - 1, -1, -1):
@@ -105,7 +120,11 @@ def reverse(tile: Tile, code: Index, size: int, first: int, register: Array, adj
             if g == 0.0:
                 continue
             x, y = register[a + lane], register[b + lane]
-            by_x, by_y = _slopes(operation, x, y, register[out + lane])
+            if ABSOLUTE <= operation <= MAXIMUM:
+                above = branch[c + lane] > 0.0 if held else _is_above(operation, x, y)
+                by_x, by_y = _sides(operation, x, above)
+            else:
+                by_x, by_y = _slopes(operation, x, y, register[out + lane])
             adjoint[a + lane] += g * by_x
             if by_y != 0.0:
                 adjoint[b + lane] += g * by_y
@@ -113,9 +132,19 @@ def reverse(tile: Tile, code: Index, size: int, first: int, register: Array, adj
                 adjoint[c + lane] += g
 
 
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _sides(operation: int, x: float, above: bool) -> tuple[float, float]:
+    """Derivatives of a switch on its side; 0 of |x| at 0."""
+    if operation == ABSOLUTE:
+        return 0.0 if x == 0.0 else 1.0 if above else -1.0, 0.0
+    if operation == STEP:
+        return 0.0, 0.0
+    return (1.0, 0.0) if above == (operation == MAXIMUM) else (0.0, 1.0)
+
+
 @njit(cache=True, error_model="numpy")
 def _slopes(operation: int, x: float, y: float, value: float) -> tuple[float, float]:
-    """Derivatives of an operation by its first two arguments; 0 at kinks and where a root has no slope."""
+    """Derivatives of an operation that does not switch by its first two arguments; 0 where a root has no slope."""
     by_x, by_y = 1.0, 0.0
     if operation == ADD:
         by_y = 1.0
@@ -132,16 +161,8 @@ def _slopes(operation: int, x: float, y: float, value: float) -> tuple[float, fl
     elif operation == POWER:
         by_x = y * x ** (y - 1.0) if y != 0.0 and (x != 0.0 or y >= 1.0) else 0.0
         by_y = value * np.log(x) if x > 0.0 else 0.0
-    elif operation == MINIMUM:
-        by_x, by_y = (1.0, 0.0) if x < y else (0.0, 1.0)
-    elif operation == MAXIMUM:
-        by_x, by_y = (1.0, 0.0) if x > y else (0.0, 1.0)
-    elif operation == ABSOLUTE:
-        by_x = 1.0 if x > 0.0 else -1.0 if x < 0.0 else 0.0
-    elif operation == STEP:
-        by_x = 0.0
-    elif operation in (RAMP, RISE):
-        by_x = 30.0 * (x * (1.0 - x)) ** 2 if operation == RISE or 0.0 < x < 1.0 else 0.0
+    elif operation == RISE:
+        by_x = 30.0 * (x * (1.0 - x)) ** 2
     elif operation == SINE:
         by_x = np.cos(x)
     elif operation == COSINE:

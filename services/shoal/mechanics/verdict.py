@@ -29,6 +29,7 @@ from shoal.mechanics.marched import (
 )
 from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import Array, Flags
+from shoal.mechanics.signals import CHATTERS
 from shoal.scene import GROUND, Function, Scene
 from shoal.scene.joints import Joint
 
@@ -138,6 +139,9 @@ class Limits:
             return kinds.NO_START.found("no start agrees with the joints and with what is stated")
         if not finite and numbers[UNCLOSED] >= 0:
             return self._open(kinds.NOT_CLOSED if self._driven else kinds.TORN_OPEN, numbers, adaptive)
+        if not finite and numbers[UNDECIDED] == CHATTERS:
+            fields, time = ", ".join(self._model.signal_fields), float(numbers[ENDED])
+            return kinds.CHATTERS.found(f"signals of {fields} switch without end at t = {time:.6g} s", time=time)
         if not finite and numbers[UNDECIDED] >= 0:
             return self._contact(int(numbers[UNDECIDED]), float(numbers[ENDED]))
         singular = numbers[SINGULAR] == HERE

@@ -23,6 +23,7 @@ from shoal.mechanics.march import March
 from shoal.mechanics.marched import Marched, framed
 from shoal.mechanics.model import Arrays, Model
 from shoal.mechanics.numerics.tile import Array, Tile, pack
+from shoal.mechanics.signals import hold, switches_held
 from shoal.scene import Solver
 
 T = TypeVar("T")
@@ -49,6 +50,8 @@ def put_at_start(model: Model, tile: Tile, part: slice, arrays: Arrays, room: Wo
     if followed := arrays.followed:
         derived_rows(tile, arrays, room)
         start = pack(model.signal_angles, part, tile)
+        if switches_held(arrays, tile):
+            hold(followed, room.signals)
         room.signals[: start.size] = forces.initial_memory(tile, followed.measures, room.z, start)
     if model.gaps.size:
         derived_rows(tile, arrays, room)

@@ -43,6 +43,7 @@ class SignalLoads:
         self._constants: list[Number] = []
         self.names: list[str] = []
         self._code: list[tuple[int, list[Operand]]] = []
+        self._switches: list[int] = []
         self._known: dict[Node, Operand] = {}
 
     def resolve(self, f: SignalFunction) -> tuple[Any, Node | None]:
@@ -78,7 +79,7 @@ class SignalLoads:
             "function": len(self._functions),
             "constant": len(self._constants),
         }
-        base = dict(zip([*sizes, "result"], np.cumsum([0, *sizes.values()]).tolist(), strict=True))
+        base = dict(zip([*sizes, "result"], np.cumsum([0, *sizes.values()]).tolist(), strict=True)) | {"switch": 0}
 
         def register(operand: Operand) -> int:
             return int(base[operand[0]]) + operand[1]
@@ -102,6 +103,8 @@ class SignalLoads:
             base["result"],
             index(strengths),
             len(strengths),
+            index(self._switches),
+            len(self._switches),
             applied(lambda strength: strengths[strength]),
             turned,
         )
@@ -126,10 +129,16 @@ class SignalLoads:
             self._functions.append(self._fit(field, function))
             return "function", len(self._functions) - 1
         operation, *parts = node
+        if operation == "ramp":
+            operation, parts = "rise", [("min", ("max", parts[0], 0.0), 1.0)]
         if operation == "+" and (factors := self._product(parts)):
             self._code.append((tape.MULTIPLY_ADD, [self._operand(field, part) for part in factors]))
         else:
-            self._code.append((tape.CODES[operation], [self._operand(field, part) for part in parts]))
+            operands, number = [self._operand(field, part) for part in parts], tape.CODES[operation]
+            if number in tape.SWITCHES:  # whose last entry is their number
+                operands = [operands[0], operands[-1], ("switch", len(self._switches))]
+                self._switches.append(len(self._code))
+            self._code.append((number, operands))
         return "result", len(self._code) - 1
 
     def _state(self, field: str, name: str) -> Operand:
