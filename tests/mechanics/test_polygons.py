@@ -328,3 +328,50 @@ def test_polygons_are_refused_by_name_where_nothing_knows_them() -> None:
     both = {"first": {"body": "B", "polygon": TRIANGLE}, "second": {"body": "ground", "polygon": TRIANGLE}}
     with pytest.raises(InputError, match=r"first\.polygon: the first side is a point or round"):
         machine(DISC, {"c": both}, {"position": [2.0, 2.0]}, 1.0)
+
+
+def room(seed: int, *, whole: bool) -> Scene:
+    """A disc or point in a convex room, which turns or is at rest: of one polygon clockwise, or of a line for each wall.
+
+    It strikes, slides, sticks and rolls, and comes to rest in corners.
+    """
+    rng = np.random.default_rng(seed)
+    moves, sides = bool(seed % 2), int(rng.integers(3, 7))
+    angle = 2 * np.pi * (np.arange(sides) + rng.uniform(0.0, 0.5, sides)) / sides
+    walls = np.stack([np.cos(angle), np.sin(angle)], axis=1)[::-1]
+    first = {"body": "B", "radius": float(rng.choice([0.0, 0.1]))}
+    law = {
+        "restitution": float(rng.choice([0.0, rng.uniform()])),
+        "mu": float(rng.choice([0.0, rng.uniform(0.0, 0.8)])),
+    }
+    on, body = "K" if moves else "ground", {"kind": "rigid-body", "mass": 1.0, "inertia": 0.004}
+    contacts = {"c": {"first": first, "second": {"body": on, "point": [0.0, 0.0], "polygon": walls.tolist()}, **law}}
+    if not whole:
+        contacts = {}
+        for k, (one, other) in enumerate(zip(walls, np.roll(walls, -1, axis=0), strict=True)):
+            line = {"body": on, "point": one.tolist(), "line": float(np.arctan2(*(one - other)[::-1]))}
+            contacts[f"c{k}"] = {"first": first, "second": line, **law}
+    start: dict[str, Any] = {"B": {"position": [0.0, 0.0], "velocity": rng.uniform(-2.0, 2.0, 2).tolist(),
+                                   "rate": float(rng.uniform(-5.0, 5.0) * (first["radius"] > 0)), "angle": 0.0}}  # fmt: skip
+    more: dict[str, Any] = {"gravity": [0.0, 0.0 if moves else -G], "bodies": {"B": body}}
+    if moves:
+        more["bodies"]["K"] = {"kind": "rigid-body", "mass": 3.0, "inertia": 1.0, "centre_of_mass": [0.1, 0.0]}
+        start["K"] = {
+            "position": [0.0, 0.0],
+            "velocity": [0.0, 0.0],
+            "angle": 0.0,
+            "rate": float(rng.uniform(-1.0, 1.0)),
+        }
+        more["loads"] = {"s": {"kind": "spring", "first": {"body": "B"}, "second": {"body": "K", "point": [0.6, 0.3]},
+                               "stiffness": 3.0, "length": 0.0}}  # fmt: skip
+    return Scene.parse({"name": "room", "contacts": contacts, "initial": start, "markers": {"B": {"body": "B"}},
+                        "solver": {"duration": 1.5, "relative_tolerance": 1e-11}, **more})  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2, 3, 4, 5, 6, 7, 130, 171])
+def test_a_room_of_a_polygon_is_that_of_the_lines_of_its_walls(seed: int) -> None:
+    times = np.array([0.5, 1.0, 1.5])
+    one, other = (simulate(room(seed, whole=whole), times) for whole in (True, False))
+    assert one.ok == other.ok
+    if one.ok:
+        np.testing.assert_allclose(one.points, other.points, atol=1e-6)

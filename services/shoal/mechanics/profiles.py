@@ -81,8 +81,10 @@ def _goes_on(p: Profiles, pair: int, after: int, x: float, y: float, end_x: floa
     across = dx * p.numbers[after + 1] - dy * p.numbers[after]  # to the right of the way
     length = p.numbers[after + 2]
     size, height = abs(length), across if length > 0.0 else -across
-    over = -ROUND_OFF * size <= along <= size and height >= -ROUND_OFF * size
-    return over or _is_behind(p, pair, x, y, np.hypot(dx, dy))  # type: ignore[no-any-return]
+    beside = -ROUND_OFF * size <= along <= size
+    # In the body it has come in here where either edge is the nearest one.
+    away = min(np.hypot(dx, dy), abs(across) if beside else np.inf)
+    return (beside and height >= -ROUND_OFF * size) or _is_behind(p, pair, x, y, away)  # type: ignore[no-any-return]
 
 
 @njit(cache=True, error_model="numpy")
