@@ -331,7 +331,7 @@ def test_polygons_are_refused_by_name_where_nothing_knows_them() -> None:
 
 
 def room(seed: int, *, whole: bool) -> Scene:
-    """A disc or point in a convex room, which turns or is at rest: of one polygon clockwise, or of a line for each wall.
+    """A disc or point in a convex room, which turns or is at rest: one polygon clockwise, or a line for each wall.
 
     It strikes, slides, sticks and rolls, and comes to rest in corners.
     """
@@ -351,8 +351,9 @@ def room(seed: int, *, whole: bool) -> Scene:
         for k, (one, other) in enumerate(zip(walls, np.roll(walls, -1, axis=0), strict=True)):
             line = {"body": on, "point": one.tolist(), "line": float(np.arctan2(*(one - other)[::-1]))}
             contacts[f"c{k}"] = {"first": first, "second": line, **law}
-    start: dict[str, Any] = {"B": {"position": [0.0, 0.0], "velocity": rng.uniform(-2.0, 2.0, 2).tolist(),
-                                   "rate": float(rng.uniform(-5.0, 5.0) * (first["radius"] > 0)), "angle": 0.0}}  # fmt: skip
+    spin = float(rng.uniform(-5.0, 5.0) * bool(first["radius"]))
+    thrown = {"position": [0.0, 0.0], "velocity": rng.uniform(-2.0, 2.0, 2).tolist(), "rate": spin, "angle": 0.0}
+    start: dict[str, Any] = {"B": thrown}
     more: dict[str, Any] = {"gravity": [0.0, 0.0 if moves else -G], "bodies": {"B": body}}
     if moves:
         more["bodies"]["K"] = {"kind": "rigid-body", "mass": 3.0, "inertia": 1.0, "centre_of_mass": [0.1, 0.0]}
