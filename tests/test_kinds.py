@@ -68,7 +68,7 @@ def casadi_forces(scene: Scene) -> Any:
     from shoal.engines.casadi.loads import applied
     from shoal.engines.casadi.tree import build_tree
 
-    return applied(scene, build_tree(scene))
+    return applied(scene, build_tree(scene), None)
 
 
 PLACES: dict[str, Callable[[], Any]] = {

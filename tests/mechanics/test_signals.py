@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from shoal.engines import get_engine
 from shoal.errors import InputError, UnstableStepError
 from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.analysis.modes import modes
@@ -321,6 +322,35 @@ def test_lanes_are_single_runs(integrator: str) -> None:
     for lane in (0, 7, 15):
         alone = simulate(scene.with_values({"signals.kp": gains[lane]}), times)
         assert side_by_side.points[..., lane] == pytest.approx(alone.points[..., 0], abs=1e-11)
+
+
+def swung() -> dict[str, Any]:
+    """Two rods with a motor in each hinge and a spring between places by formulas, without time."""
+    data = two_link()
+    data["signals"] = {"k": 30.0, "aim": "0.3 - tanh(angle(elbow))", "lever": "position(elbow, x)"}
+    data["loads"] = {
+        "first": {"kind": "torque", "at": {"body": "upper"}, "torque": "k*(aim - angle(shoulder)) - 2*rate(shoulder)"},
+        "second": {
+            "kind": "torque", "at": {"body": "fore"}, "reaction": {"body": "upper"},
+            "torque": "min(max(5*(0.2 - angle(fore)) - rate(fore), -2), 2)",
+        },
+        "pull": {
+            "kind": "force", "at": {"body": "fore", "point": "end"}, "force": [0.3, 1], "follows": True,
+            "scale": "3*distance(hand, ground) - velocity(hand, y)*abs(distance_rate(hand, ground)) + lever",
+        },
+    }  # fmt: skip
+    return data
+
+
+def test_casadi_agrees_on_what_loads_follow() -> None:
+    """Its equations are those of Lagrange in angles, with the formulas as its own expressions, by CVODES."""
+    pytest.importorskip("casadi")
+    scene, times = Scene.parse(swung()), np.array([0.5, 1.0])
+    ours, theirs = simulate(scene, times), get_engine("casadi").simulate(scene, times)
+    assert theirs.ok
+    assert theirs.points == pytest.approx(ours.points, abs=1e-7)
+    with pytest.raises(InputError, match=r"loads.first.torque: engine casadi cannot do functions of time"):
+        get_engine("casadi").simulate(Scene.parse(two_link()))
 
 
 @pytest.mark.parametrize(("integrator", "order"), [("rk4", 4), ("leapfrog", 2)])

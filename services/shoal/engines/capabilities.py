@@ -10,6 +10,7 @@ from shoal.engines.known import ENGINES
 from shoal.errors import InputError
 from shoal.scene import GROUND, Coupling, Function, Joint, Load, PointMass, Rod, Scene, SignalFunction
 from shoal.scene.joints import Transmission, places
+from shoal.scene.signals import depends_on_time
 
 T = TypeVar("T")
 FEATURES = (
@@ -101,6 +102,9 @@ def needs(scene: Scene) -> Iterator[tuple[str, str]]:
             yield f"contacts.{name}.first.polygon", "corners of polygons"
     for name, load in scene.loads.items():
         yield from _item(f"loads.{name}", load)
+        for field, value in load:
+            if isinstance(value, SignalFunction) and not value.of_time and depends_on_time(scene, value):
+                yield f"loads.{name}.{field}", "functions of time"
     yield from ((f"states.{name}", "states") for name in scene.states)
 
 

@@ -122,6 +122,11 @@ def written_out(scene: Any, function: SignalFunction) -> Node:
     return _put(_tree(function), known)
 
 
+def depends_on_time(scene: Any, function: SignalFunction) -> bool:
+    """Return whether any part of a function is one of time."""
+    return any(leaf == "t" or isinstance(leaf, Table) for leaf in leaves(written_out(scene, function)))
+
+
 def is_of_time(node: Node) -> bool:
     """Return whether a tree that is written out depends on t alone, and can be written as one expression."""
     return all(leaf == "t" for leaf in leaves(node))

@@ -32,7 +32,7 @@ _CHECK_INTERVAL = 0.01
 
 @dataclass(frozen=True)
 class CasadiEngine:
-    """Simulates open chains of rigid bodies and cables under springs and constant loads.
+    """Simulates open chains of rigid bodies and cables under springs, and loads that depend on no time.
 
     CVODES does not use the scene's own integrator and step.
 
@@ -54,7 +54,7 @@ class CasadiEngine:
             elements=frozenset({"rigid", "ancf-cable"}),
             joints=frozenset({"revolute"}),
             loads=frozenset({"spring", "torsion-spring", "force", "torque", "distributed-force"}),
-            features=frozenset({"point masses", "dry friction", "quadratic drag", "tapered flexible rods"}),
+            features=frozenset({"point masses", "dry friction", "quadratic drag", "tapered flexible rods", "signals"}),
             lanes=False,
         )
 

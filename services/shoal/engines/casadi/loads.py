@@ -1,4 +1,4 @@
-"""Springs, friction and constant loads as CasADi expressions: stored energy, dissipation, generalised forces."""
+"""Springs, friction and loads without time as CasADi expressions: stored energy, dissipation, generalised forces."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from shoal.engines.capabilities import of_kind
 from shoal.engines.casadi.bodies import PlacedCable
+from shoal.engines.casadi.signals import strength
 from shoal.engines.casadi.tree import PlacedTree
 from shoal.engines.poses import initial_poses, start_of
 from shoal.errors import InputError
@@ -76,18 +77,17 @@ def dissipation(scene: Scene, tree: PlacedTree, v: Any) -> Any:
     return total
 
 
-def applied(scene: Scene, tree: PlacedTree) -> Any:
-    """Generalised forces of the applied loads, all constant but for the direction of following ones, (unknowns,)."""
+def applied(scene: Scene, tree: PlacedTree, v: Any) -> Any:
+    """Generalised forces of the applied loads, constant or by signals at the rates v, (unknowns,)."""
     total = ca.SX.zeros(tree.coordinates.numel())
     for name, load in scene.loads.items():
         if load.kind not in ELONGATIONS:
-            total += of_kind(FORCES, load.kind, f"loads.{name}")(scene, tree, f"loads.{name}", load)
+            total += of_kind(FORCES, load.kind, f"loads.{name}")(scene, tree, v, f"loads.{name}", load)
     return total
 
 
-def _force(scene: Scene, tree: PlacedTree, where: str, load: Force) -> Any:
-    assert load.scale.number is not None
-    force = load.scale.number * ca.SX(load.force)
+def _force(scene: Scene, tree: PlacedTree, v: Any, where: str, load: Force) -> Any:
+    force = strength(scene, tree, v, load.scale) * ca.SX(load.force)
     if load.follows:
         c, s = (f(_angle(scene, tree, where, load.at)) for f in (ca.cos, ca.sin))
         force = ca.vertcat(c * force[0] - s * force[1], s * force[0] + c * force[1])
@@ -95,21 +95,19 @@ def _force(scene: Scene, tree: PlacedTree, where: str, load: Force) -> Any:
     return ca.jtimes(point, tree.coordinates, force, True)
 
 
-def _torque(scene: Scene, tree: PlacedTree, where: str, load: Torque) -> Any:
-    assert load.torque.number is not None
+def _torque(scene: Scene, tree: PlacedTree, v: Any, where: str, load: Torque) -> Any:
     turn = _angle(scene, tree, where, load.at)
     if load.reaction is not None:
         turn = turn - _angle(scene, tree, where, load.reaction)
-    return load.torque.number * ca.gradient(turn, tree.coordinates)
+    return strength(scene, tree, v, load.torque) * ca.gradient(turn, tree.coordinates)
 
 
-def _distributed(scene: Scene, tree: PlacedTree, where: str, load: DistributedForce) -> Any:
-    assert load.scale.number is not None
-    way = ca.dot(load.scale.number * ca.SX(load.force), _integral(scene, tree, load.body))
-    return ca.gradient(way, tree.coordinates)
+def _distributed(scene: Scene, tree: PlacedTree, v: Any, where: str, load: DistributedForce) -> Any:
+    way = ca.dot(ca.SX(load.force), _integral(scene, tree, load.body))
+    return strength(scene, tree, v, load.scale) * ca.gradient(way, tree.coordinates)
 
 
-FORCES: dict[str, Callable[[Scene, PlacedTree, str, Any], Any]] = {
+FORCES: dict[str, Callable[[Scene, PlacedTree, Any, str, Any], Any]] = {
     "force": _force,
     "torque": _torque,
     "distributed-force": _distributed,

@@ -59,7 +59,7 @@ def _build(text: str) -> CasadiModel:
     v = ca.SX.sym("v", q.numel())
     x = ca.vertcat(q, v, ca.SX.sym("w"))
     kinetic, elastic, gravity = _kinetic(scene, tree, v), _elastic(tree) + stored(scene, tree), _gravity(scene, tree)
-    resisting = ca.gradient(dissipation(scene, tree, v), v) - applied(scene, tree)
+    resisting = ca.gradient(dissipation(scene, tree, v), v) - applied(scene, tree, v)
     momentum = ca.gradient(kinetic, v)
     # Lagrange's equations: d/dt dT/dv - dT/dq + dU/dq + dD/dv = Q.
     force = ca.gradient(kinetic - elastic - gravity, q) - resisting - ca.jtimes(momentum, q, v)
