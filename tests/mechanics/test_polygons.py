@@ -286,6 +286,15 @@ def test_the_corners_of_a_box_at_rest_bear_its_weight_together() -> None:
     assert told.state == "sticks"
 
 
+def test_a_disc_rolls_softly_over_a_corner_and_keeps_its_energy() -> None:
+    law = {"stiffness": 1e6, "exponent": 1.5}
+    road = {"first": {"body": "B", "radius": RADIUS}, "second": {"body": "ground", "polygon": HILL}, "law": law}
+    deep = (2.0 * G / 1e6) ** (2 / 3)
+    found = run(machine(DISC, {"road": road}, {"position": [-0.1, RADIUS - deep], "velocity": [0.3, 0.0]}, 0.7))
+    assert found.points[0, 0, 0, 0] > 0.2
+    assert not events(found, "opens")
+
+
 def test_lanes_of_discs_roll_bounce_and_fly_as_alone() -> None:
     scene, times = hill(0.3, 0.9), np.linspace(0.0, 0.9, 7)
     values = {"initial.B.velocity.0": np.array([0.3, 1.0, 2.0, 3.0])}
@@ -307,11 +316,16 @@ TRIANGLE = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]
         ({"polygon": [[0, 0], [1, 1], [1, 0], [0, 1]]}, "polygon: the edges that begin at corners 0 and 2 meet"),
         ({"polygon": [*TRIANGLE, [0.0, 1.0]]}, "polygon.2: [0, 1] is there twice in a row"),
         ({"polygon": [[0, 0], [1, 0], [2, 0]]}, "polygon"),
+        (
+            {"polygon": TRIANGLE, "law": {"stiffness": 1e5}},
+            "law: of a polygon into which a point sinks past its corners",
+        ),
         ({"polygon": TRIANGLE, "line": 0.0}, "polygon: line is stated as well; a surface has one shape"),
     ],
 )
 def test_a_polygon_that_is_none_is_refused(second: dict[str, Any], text: str) -> None:
-    contact = {"first": {"body": "B"}, "second": {"body": "ground", **second}}
+    law = {"law": second.pop("law")} if "law" in second else {}
+    contact = {"first": {"body": "B"}, "second": {"body": "ground", **second}, **law}
     with pytest.raises(InputError, match=re.escape(text)):
         machine(DISC, {"c": contact}, {"position": [2.0, 2.0]}, 1.0)
 

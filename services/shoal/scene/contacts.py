@@ -136,6 +136,8 @@ class Contact(Record):
             )
         if self.law is not None and (np.any(self.restitution) or np.any(self.tangential_restitution)):
             raise ValueError("restitution: is of rigid surfaces; state that of the law")
+        if self.law is not None and self.second.polygon is not None and not np.all(self.first.radius):
+            raise ValueError("law: of a polygon into which a point sinks past its corners; state first.radius")
         if self.mu_static is not None and np.any(self.mu_static < self.mu):
             raise ValueError(f"mu_static: must be at least mu, found {self.mu_static:g} and {self.mu:g}")
         return self
