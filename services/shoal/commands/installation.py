@@ -80,9 +80,12 @@ def export(asked: Export, out: Out) -> None:
 @click.option(
     "--argument", "stated", multiple=True, metavar="NAME=VALUE", help="An argument of the macros of a file (xacro)."
 )
+@click.option("--no-contacts", is_flag=True, help="Leave out the contacts of the file.")
 @options.out(".yaml", otherwise="; else the file's name")
 @options.as_json
-def import_scene(file: Path, partial: bool, root: Any, stated: tuple[str, ...], out: Out, as_json: bool) -> None:
+def import_scene(
+    file: Path, partial: bool, root: Any, stated: tuple[str, ...], no_contacts: bool, out: Out, as_json: bool
+) -> None:
     """Write the machine of FILE (URDF, or MuJoCo's MJCF) as a scene. What became what is listed on stderr."""
     import yaml
 
@@ -93,7 +96,7 @@ def import_scene(file: Path, partial: bool, root: Any, stated: tuple[str, ...], 
 
     if wrong := next((one for one in stated if "=" not in one), None):
         raise InputError(f"--argument: must be NAME=VALUE, found {wrong[:40]!r}")
-    found = read(file, root, dict(one.split("=", 1) for one in stated))
+    found = read(file, root, dict(one.split("=", 1) for one in stated), contacts=not no_contacts)
     if found.missing and not partial:
         others = f" (and {len(found.missing) - 1} more)" if len(found.missing) > 1 else ""
         what = f"{found.missing[0]}{others} has no counterpart: the scene would be another machine"

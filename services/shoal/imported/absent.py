@@ -11,11 +11,9 @@ from shoal.imported.switches import disables
 
 
 def absent(source: Source) -> Iterator[str]:
-    """Lines for what a model has and no scene has: contacts, sensors, a medium and so on."""
+    """Lines for what a model has and no scene has: sensors, a medium and so on."""
     model = source.model
     colliding = int(np.sum((model.geom_contype != 0) | (model.geom_conaffinity != 0)))
-    if colliding:
-        yield f"geoms: {colliding} that touch others; a scene has no contacts"
     if model.ngeom - colliding:
         yield f"geoms: {model.ngeom - colliding} that are only seen"
     for what, count in (

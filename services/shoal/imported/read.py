@@ -20,6 +20,7 @@ from shoal.imported.assets import do_without
 from shoal.imported.audit import MJCF, URDF, constraints, unread
 from shoal.imported.axes import Axes
 from shoal.imported.bodies import initial, is_mass, mass, rigid
+from shoal.imported.contacts import add_contacts
 from shoal.imported.equalities import add_equalities
 from shoal.imported.findings import findings
 from shoal.imported.hanging import hang
@@ -84,12 +85,14 @@ def load(file: Path, root: Root | None = None, arguments: Mapping[str, str] | No
     return Loaded(xml, robot, model, tuple(" ".join(str(one.message).split()) for one in told))
 
 
-def read(file: Path, root: Root | None = None, arguments: Mapping[str, str] | None = None) -> Imported:
+def read(
+    file: Path, root: Root | None = None, arguments: Mapping[str, str] | None = None, *, contacts: bool = True
+) -> Imported:
     """Return the scene of a URDF or MJCF file at its own start, in metres, kilograms, seconds and radians.
 
     root: whether the ground holds the root of a URDF file; by default it does if anything else moves. arguments: of
-    macros of xacro. Raises InputError if there is no such file, if it is wrong or if nothing in it moves, and
-    ModuleNotFoundError without MuJoCo.
+    macros of xacro. contacts: whether those of geoms are wanted. Raises InputError if there is no such file, if it is
+    wrong or if nothing in it moves, and ModuleNotFoundError without MuJoCo.
     """
     import mujoco
 
@@ -97,7 +100,7 @@ def read(file: Path, root: Root | None = None, arguments: Mapping[str, str] | No
     robot = loaded.robot
     switch_off(mujoco, loaded.model)
     source = Source.of(mujoco, loaded.model)
-    parts = _parts(source)
+    parts = _parts(source, contacts)
     add_loops(file, source, robot.loops, parts)
     notes = [*robot.notes, *parts.notes]
     if not parts.bodies:
@@ -143,7 +146,7 @@ def _audit(file: Path, root: XmlElement, parts: Parts) -> None:
         parts.left_out += unread(with_includes(root, file.parent), MJCF)
 
 
-def _parts(source: Source) -> Parts:
+def _parts(source: Source, contacts: bool) -> Parts:
     model, parts = source.model, Parts()
     # In a loop, axes of several bodies have to agree.
     loops, shared = np.any(model.eq_active0), Axes()
@@ -162,6 +165,10 @@ def _parts(source: Source) -> Parts:
     add_actuators(source, parts)
     if model.nflex:
         parts.miss(f"flexible bodies: {model.nflex}")
+    if contacts:
+        add_contacts(source, parts)
+    elif np.any(source.model.geom_contype | source.model.geom_conaffinity):
+        parts.left_out.append("geoms: all that touch others, as asked")
     parts.left_out += absent(source)
     return parts
 

@@ -58,7 +58,7 @@ def trial(path: Path, folder: Path) -> Trial:
     """Import a file, and move it."""
     name = str(path.relative_to(folder))
     try:
-        found = read(path)
+        found = read(path, contacts=False)
     except ShoalError as error:
         said = str(error).replace(str(path), "")
         why = next((reason for word, reason in REASONS.items() if word in said), "")
