@@ -18,6 +18,7 @@ from shoal.scene.amplitudes import check_amplitudes, check_place
 from shoal.scene.bodies import FRAMED, Body, Rod
 from shoal.scene.clearances import check_clearances, contacts_of
 from shoal.scene.contacts import Contact, check_contacts
+from shoal.scene.controllers import Controller, with_controllers
 from shoal.scene.dimensions import Dimensions, check_dimensions, padded
 from shoal.scene.ended import End
 from shoal.scene.expect import Expectation, ExpectedValue
@@ -78,6 +79,8 @@ class Scene(Record):
     """Signals by name: formulas of time, measures of the machine and other signals, which loads may follow."""
     states: dict[SignalName, State] = {}
     """States of controllers, actuators and other dynamics of first order, by name."""
+    controllers: Annotated[dict[SignalName, Controller], Field(exclude=True)] = {}
+    """Controllers by name; when a scene is read they become signals and states, which it is written with."""
     ground_points: dict[Name, MovingPoint] = {}
     """Moving points of the ground by name."""
     markers: Annotated[dict[Name, Attachment], Field(min_length=1)]
@@ -92,6 +95,11 @@ class Scene(Record):
     """Settings of the integrator and of the checks of a run."""
     expect: Annotated[dict[Name, Expectation], Field(exclude=True)] = {}
     """Nightly checks of a scene of the library, by name; no part of the machine."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _with_controllers(cls, data: Any) -> Any:
+        return with_controllers(data) if isinstance(data, dict) else data
 
     @model_validator(mode="before")
     @classmethod
