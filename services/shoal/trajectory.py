@@ -55,6 +55,8 @@ class Trajectory(Concluded):
         (samples, markers, lanes); None where the engine does not tell them
     end: the whole state at the last instant, from which `initial_from` lets a scene go on; None where it is not known,
         as of several lanes and of other engines
+    words: events of contacts of each lane in the order of time, as (time [s], what and where), of runs of the native
+        engine; empty of machines without contacts
     states: coordinates and rates at `times`, of runs of the native engine that were asked for them, else None
     changes: what each lane uses in place of what is stated of its start, as `model["initial_changes"]` tells it of a
         single one; empty of a single lane, and where the engine does not tell it
@@ -74,6 +76,7 @@ class Trajectory(Concluded):
     velocities: Array | None = None
     rates: Array | None = None
     end: Mapping[str, Any] | None = None
+    words: Sequence[Sequence[tuple[float, str]]] = ()
     states: Any = None
     changes: Sequence[Mapping[str, Any]] = ()
 

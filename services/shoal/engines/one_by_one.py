@@ -96,5 +96,6 @@ def _side_by_side(runs: Sequence[Trajectory], wall_s: float) -> Trajectory:
         lane_findings=[run.findings for run in runs],
         model=next((run.model for run in runs if run.model), {}),
         states=first,
+        words=[next(iter(run.words), ()) for run in runs] if any(run.words for run in runs) else (),
         changes=[run.changed() for run in runs],
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import groupby
 from typing import Any
 
 from shoal.mechanics.contact.decision import KINDS
@@ -53,6 +54,25 @@ def recorded(log: Array, fields: Sequence[str], closed: Array) -> list[dict[str,
     for contact in [contact for contact in impacts if closed[contact] != 0.0]:
         rest(contact)
     return [each for k, event in enumerate(found) for each in (event, rests.get(k)) if each is not None]
+
+
+def letter(event: Mapping[str, Any]) -> tuple[float, str]:
+    """Return the time [s] of an event, and what it is and where, as `floor impact`."""
+    return float(event["time"]), f"{place_of(event)} {event['kind']}"
+
+
+def word(letters: Sequence[tuple[float, str]], until: float) -> str:
+    """Return the events until a time [s] as one text. Impacts that accumulate in a rest are part of it."""
+    found: list[str] = []
+    for time, one in letters:
+        if time > until:
+            continue
+        place, _, kind = one.rpartition(" ")
+        if kind == "rests":
+            found = [each for each in found if each != f"{place} impact"]
+        found.append(one)
+    times = ((one, len(list(same))) for one, same in groupby(found))
+    return ", ".join(one if count == 1 else f"{count} x {one}" for one, count in times)
 
 
 def place_of(event: Mapping[str, Any]) -> str:

@@ -23,6 +23,7 @@ from shoal.mechanics.assembly.redundancy import redundant_joints
 from shoal.mechanics.assembly.starts import Starts
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.ended import Ended
+from shoal.mechanics.event_record import letter
 from shoal.mechanics.gaps import DRY
 from shoal.mechanics.halts import Halts
 from shoal.mechanics.integrators import Choice, halting
@@ -109,6 +110,7 @@ class Runs:
         happened: list[dict[str, Any]] = []
         closed: list[str] = []
         unclear: list[str] = []
+        words: list[list[tuple[float, str]]] = [[] for _ in range(moved.lanes)]
         states = States.room(moved, len(times)) if whole else None
         stop = Event() if workers > 1 else None
 
@@ -123,6 +125,8 @@ class Runs:
             record = space.run(moved, part, stop)
             record = record if states is None else split(record, states, len(tile), part)
             reduce_record(record, len(tile), part.start, turns, limits.anchors, floor, limits.span, motion, numbers)
+            if count == 1 and self.model.gaps.size:
+                words[part.start] = [letter(event) for event in space.events]
             if single:
                 left.append(space.left)
                 happened.extend(space.events)
@@ -179,6 +183,7 @@ class Runs:
             lane_findings=findings,
             model=facts,
             end=ended,
+            words=words if self.model.gaps.size else (),
             states=states,
             changes=() if single else Changes(moved),
         )

@@ -31,13 +31,14 @@ def findings_about(
             *_time(response, problem),
             *_failed(found.runs),
             *known.findings,
-            *_horizon(found),
+            *_horizon(response, found),
             *_gap(response, problem.asked.gap),
             *_deviation(response),
             *(one for limit in response.limits for one in limit.titled),
             *(response.allocation.findings if response.allocation is not None else ()),
             *_outer(response),
             *_starts(response),
+            *_words(response),
         ]
     )
 
@@ -67,14 +68,17 @@ def _failed(runs: CachedModel) -> list[Finding]:
     return [kinds.RUNS_FAILED.found(f"{text}; they have {runs.describe_failed()}", **numbers)]
 
 
-def _horizon(found: ModelResponse) -> list[Finding]:
+def _horizon(response: Response, found: ModelResponse) -> list[Finding]:
     horizon, boxes = found.horizon, found.boxes
     if math.isinf(horizon):
         return []
     if boxes is None:
+        cause = "small changes of the parameters change everything"
+        if response.words is not None:
+            cause = "the sequences of events are too many, or their parts of the parameters too small"
         text = (
-            f"bounds hold until {horizon:g} s; beyond, small changes of the parameters change everything, and what is "
-            "reported is what runs attained, how far the machine reaches, and, if every value is as likely as another, "
+            f"bounds hold until {horizon:g} s; beyond, {cause}, and what is reported is what runs attained, how far "
+            "the machine reaches, and, if every value is as likely as another, "
             f"where with 95 % confidence 95 % of all runs lie ({WILKS} random runs)"
         )
     elif boxes.places:
@@ -114,6 +118,17 @@ def _outer(response: Response) -> list[Finding]:
     return [
         kinds.OUTER_UNKNOWN.found("bounds are what runs attained; this method does not estimate how far others lie")
     ]
+
+
+def _words(response: Response) -> list[Finding]:
+    words = response.words
+    if words is None:
+        return []
+    text = (
+        f"runs have {len(words.words)} sequences of events until {response.times[-1]:g} s: {words.text}; others with "
+        f"less than {100 * words.rare:.2g} % may be unseen"
+    )
+    return [kinds.DIFFERENT_EVENTS.found(text, sequences=float(len(words.words)), rare=words.rare)]
 
 
 def _starts(response: Response) -> list[Finding]:

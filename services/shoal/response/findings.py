@@ -88,6 +88,12 @@ RARE_MISSED = Kind(
     Severity.CAUTION,
     "The probability of a limit implies a larger standard deviation than the statistics; their errors are enlarged.",
 )
+DIFFERENT_EVENTS = Kind(
+    "different-events",
+    Severity.CAUTION,
+    "Runs have different sequences of events of contacts, each in a part of the parameters of its own; rarer ones may "
+    "be unseen.",
+)
 STARTS_ELSEWHERE = Kind(
     "starts-elsewhere",
     Severity.CAUTION,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple, TypeVar
@@ -12,6 +13,7 @@ from shoal.engines.contract import Engine
 from shoal.engines.one_by_one import one_by_one
 from shoal.engines.starts import Tally
 from shoal.errors import InputError, UnstableStepError
+from shoal.mechanics.event_record import word
 from shoal.response.inputs import BoolArray, IntArray
 from shoal.response.runs import Answers, Keep
 from shoal.scene import Scene
@@ -41,7 +43,8 @@ class ResponseModel:
 
     columns: their number along each of the three; reduce: gives the answers, (lanes, columns), of the motion of a
     scene with some values of its lanes; keep: of the runs; fixed: values of parameters that are set in the scene, in
-    words, by which these are distinguished; starts: counts the runs that start elsewhere than stated
+    words, by which these are distinguished; starts: counts the runs that start elsewhere than stated; texts: of words
+    of events by their number
     """
 
     scene: Scene
@@ -51,10 +54,26 @@ class ResponseModel:
     keep: Keep | None = None
     fixed: str = ""
     starts: Tally | None = None
+    texts: dict[float, str] = field(default_factory=dict)
 
     def at(self, values: Mapping[str, float]) -> ResponseModel:
         """The same machine with these values. Raises InputError."""
         return replace(self, scene=self.scene.with_values(values), fixed=f"{self.fixed}{dict(values)}")
+
+    @property
+    def touches(self) -> bool:
+        """Return whether runs have words of events."""
+        return self.scene.touches
+
+    def _words(self, motion: Trajectory, lanes: int) -> Array:
+        """Return the words of events until each instant as numbers, (lanes, instants), and keep their texts."""
+        found = np.zeros((lanes, len(self.times)))
+        for lane, letters in enumerate(motion.words):
+            for k, until in enumerate(self.times.tolist() if letters else ()):
+                text = word(letters, until)
+                number = float(int.from_bytes(hashlib.blake2b(text.encode(), digest_size=6).digest())) if text else 0.0
+                self.texts[number], found[lane, k] = text, number
+        return found
 
     @property
     def quantities(self) -> tuple[str, ...]:
@@ -78,6 +97,7 @@ class ResponseModel:
             np.concatenate([part.good for part in parts]),
             sum(part.repeated for part in parts),
             next((part.why for part in parts if part.why), ""),
+            words=np.concatenate([part.words for part in parts if part.words is not None]) if self.touches else None,
         )
 
     def _known(self, values: Mapping[str, Array]) -> Answers:
@@ -87,7 +107,10 @@ class ResponseModel:
             label, stated = repr(getattr(self.reduce, "__self__", "markers")) + self.fixed, 0
             if self.starts is not None and (stated := len(self.starts.stated.values)):
                 label += repr(self.starts.stated.values)
-            found = self.keep(label, values, self._some, stated)
+            found = self.keep(label, values, self._some, stated + len(self.times) * self.touches)
+        if found.away is not None and self.touches:
+            away, words = np.split(found.away, [-len(self.times)], axis=1)
+            found = replace(found, away=away, words=words)
         if self.starts is not None and found.away is not None:
             self.starts.count(found.away[found.good])
         return found
@@ -119,8 +142,8 @@ class ResponseModel:
         found = np.array([done[lane].values if lane in done else missing for lane in lanes.tolist()])
         failed = _left(lanes, done)
         away = None
-        if self.starts is not None:
-            none = np.zeros(len(self.starts.stated.values))
+        if self.starts is not None or self.touches:
+            none = np.zeros_like(next(iter(done.values())).away)
             away = np.array([done[lane].away if lane in done else none for lane in lanes.tolist()])
         return Answers(found, np.isin(lanes, failed, invert=True), repeated, why if failed.size else "", away)
 
@@ -171,12 +194,16 @@ class ResponseModel:
     ) -> dict[int, _Lane]:
         reduce, good = self.reduce(motion, scene, values), _good(motion)
         away = np.zeros((len(lanes), 0)) if self.starts is None else self.starts.of(motion)
+        if self.touches:
+            away = np.column_stack([away, self._words(motion, len(lanes))])
         each = zip(lanes.tolist(), reduce, good.tolist(), away, strict=True)
         return {lane: _Lane(row, well, off) for lane, row, well, off in each}
 
 
 class _Lane(NamedTuple):
-    """values: (columns,); good: whether they may be believed; away: from what is stated of the start, see `Answers`."""
+    """values: (columns,); good: whether they may be believed; away: from what is stated of the start, see `Answers`,
+    and then the words of events of a machine that touches.
+    """
 
     values: Array
     good: bool

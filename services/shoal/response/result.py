@@ -15,6 +15,7 @@ from shoal.findings import Concluded, Finding
 from shoal.json_values import plain
 from shoal.response.allocation import Allocation
 from shoal.response.enclosure import Bounds, unseen
+from shoal.response.event_words import EventWords
 from shoal.response.findings import ResponseStatus, status_of
 from shoal.response.inputs import Inputs
 from shoal.response.limits import LimitResult
@@ -45,7 +46,8 @@ class Response(Concluded):
     and errors of statistics are wider, (columns,); stated: the scene with its model in the middle; engine: its name;
     limits: of what must not happen; allocation: tolerances that keep the limit, where they were asked for; finer: which
     bounds a finer mesh moves, where a model was asked for; controls: runs all over the box of intervals that test what
-    was predicted; elsewhere: how many of the runs, those for limits among them, start elsewhere than the scene states
+    was predicted; elsewhere: how many of the runs, those for limits among them, start elsewhere than the scene states;
+    words: of events of contacts, None where all runs have the same
     """
 
     findings: list[Finding]
@@ -74,6 +76,7 @@ class Response(Concluded):
     finer: Finer | None = None
     controls: int = 0
     elsewhere: Elsewhere | None = None
+    words: EventWords | None = None
 
     @property
     def status(self) -> ResponseStatus:
@@ -282,6 +285,7 @@ class Response(Concluded):
             "finer_mesh": None if self.finer is None else {**self.finer.to_json(), "moved": self.moved()},
             "limits": [one.to_json() for one in self.limits],
             "allocation": None if self.allocation is None else self.allocation.to_json(),
+            **({} if self.words is None else {"events": [one.to_json() for one in self.words.words]}),
             "starts": None if self.elsewhere is None else self.elsewhere.to_json(),
         }
 

@@ -25,7 +25,8 @@ class Answers:
 
     values: (runs, columns); good: which may be believed, (runs,); repeated: how many took smaller steps; why: of the
     first that may not be believed; away: how far each starts from what is stated of its start, (runs, stated values),
-    None where starts are not counted
+    None where starts are not counted; words: of events of contacts until each instant, as numbers, (runs, instants),
+    None of machines without contacts
     """
 
     values: Array
@@ -33,6 +34,7 @@ class Answers:
     repeated: int = 0
     why: str = ""
     away: Array | None = None
+    words: Array | None = None
 
 
 class TooManyRunsError(Exception):
@@ -57,6 +59,7 @@ class CachedModel:
     _xi: list[Array] = field(default_factory=list)
     _values: list[Array] = field(default_factory=list)
     _good: list[BoolArray] = field(default_factory=list)
+    _words: list[Array] = field(default_factory=list)
     controls: int = 0
     named: int = 0
     aside: int = 0
@@ -86,6 +89,8 @@ class CachedModel:
         self._xi.append(fresh)
         self._values.append(answers.values)
         self._good.append(answers.good)
+        if answers.words is not None:
+            self._words.append(answers.words)
         self.repeated += answers.repeated
         self.why = self.why or answers.why
         if self.failed == sum(map(len, self._xi)):
@@ -106,7 +111,7 @@ class CachedModel:
     def set_aside(self) -> None:
         """Forget all runs but their number, where they do not suit the method that goes on."""
         self.aside, self.why = self.evaluations, ""
-        self._xi, self._values, self._good = [], [], []
+        self._xi, self._values, self._good, self._words = [], [], [], []
 
     def part(self, which: BoolArray) -> CachedModel:
         """Some of the good runs, (runs,), for fits to fewer of them."""
@@ -156,6 +161,11 @@ class CachedModel:
     def values(self) -> Array:
         """Answers of the good runs, (runs, columns)."""
         return np.concatenate(self._values)[np.concatenate(self._good)]
+
+    @property
+    def words(self) -> Array | None:
+        """Words of events of the good runs, (runs, instants); None of machines without contacts."""
+        return np.concatenate(self._words)[np.concatenate(self._good)] if self._words else None
 
     @property
     def attaining(self) -> Array:

@@ -77,6 +77,11 @@ class Study:
         return self.runs.inputs
 
     @property
+    def has_events(self) -> bool:
+        """Return whether runs have words of events."""
+        return bool(getattr(self.runs.model, "touches", False))
+
+    @property
     def fair(self) -> int:
         """Runs that a study may take without further reason: some more than a polynomial of degree four has terms."""
         return fair_runs(size(len(self.inputs), 4))

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 from shoal.response.methods import chaos, long_time, sampling
 from shoal.response.methods.bounds import bounds
+from shoal.response.methods.by_word import by_word, differ
 from shoal.response.methods.long_time import UnsuitableError, watch
 from shoal.response.methods.nested import nested
 from shoal.response.methods.quadrature import quadrature
@@ -32,8 +33,8 @@ UNEVEN = 0.02
 def auto(study: Study) -> Found:
     """Choose by what is known of the parameters and by how the answers depend on them.
 
-    Intervals: `bounds`, `time-warp` or `torus`. Distributions: quadrature, chaos or else quasi-random runs. Both:
-    `nested`.
+    Intervals: `bounds`, `time-warp`, `torus`, or `by_word` where runs have different events. Distributions:
+    quadrature, chaos or else quasi-random runs. Both: `nested`.
     """
     if not study.inputs.random.any():
         return _intervals(study)
@@ -56,6 +57,8 @@ def auto(study: Study) -> Found:
 
 
 def _intervals(study: Study) -> Found:
+    if study.has_events and differ(study):
+        return by_word(study)
     if study.over_time is None or study.when[-1] <= 0:
         return bounds(study)
     tried = ""
