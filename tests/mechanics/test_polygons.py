@@ -232,6 +232,35 @@ class Struck:
         self.gains = self.gains or bool(self.v @ (heavy * self.v) > before * (1 + 1e-9))
 
 
+class Terrain(Struck):
+    """A disc or point that is thrown fast over ground with hills, steps and valleys, in few steps of its flight."""
+
+    def __init__(self, seed: int) -> None:
+        super().__init__(seed)
+        rng = np.random.default_rng(1000 + seed)
+        self.radius, self.kept, self.mu = float(rng.choice([0.0, 0.05, 0.3])), rng.uniform(0.5, 1.0), 0.0
+        x = np.sort(rng.uniform(-2.5, 2.5, int(rng.integers(2, 9))))
+        y = rng.uniform(-0.6, 0.6, len(x)) * (rng.uniform(size=len(x)) < 0.6)
+        ground = np.stack([np.r_[-3.0, x, 3.0], np.r_[0.0, y, 0.0]], axis=1)
+        self.polygon = np.concatenate([[[-3.0, -3.0], [3.0, -3.0]], ground[::-1]])
+        self.free, self.mass = False, np.array([1.0, 1.0, 0.02, np.inf, np.inf, np.inf])
+        self.gravity = np.array([0.0, -G, 0.0, 0.0, 0.0, 0.0])
+        self.q = np.array([rng.uniform(-2.5, -1.5), rng.uniform(1.0, 1.6), 0.0, 0.0, 0.0, 0.0])
+        self.v = np.array([rng.uniform(1.0, 6.0), rng.uniform(-1.0, 2.0), 0.0, 0.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_body_thrown_over_random_ground_misses_no_impact(seed: int) -> None:
+    body = Terrain(seed)
+    contact = {"first": {"body": "B", "radius": body.radius}, "restitution": body.kept,
+               "second": {"body": "ground", "polygon": body.polygon.tolist()}}  # fmt: skip
+    start = {"position": body.q[:2].tolist(), "velocity": body.v[:2].tolist()}
+    found = run(machine(DISC, {"hit": contact}, start, 0.8, relative_tolerance=1e-12))
+    times, q = body.run(0.8)
+    assert events(found, "impact") == pytest.approx(times, abs=1e-8)
+    np.testing.assert_allclose(found.points[0, 0, :, 0], q[:2], atol=1e-7)
+
+
 @pytest.mark.parametrize("seed", range(12))
 def test_a_disc_or_point_bounces_on_a_random_polygon(seed: int) -> None:
     """Convex and concave ones, at rest or free to fly and turn, with friction and spin."""
