@@ -92,3 +92,17 @@ def test_names_that_controllers_make_clash_with_none() -> None:
     data = on_rail(1.0, 0.0, "c", controllers={"c": {"kind": "pid", "of": "1", "kp": 2}}, signals={"c_kp": 3})
     with pytest.raises(InputError, match=r"controllers.c: makes c_kp, which is there already"):
         Scene.parse(data)
+
+
+def test_signals_states_and_loads_are_recorded_at_the_sampled_times() -> None:
+    """As they are before a switch or a jump at that time; the integral by matrix exponentials."""
+    times = np.array([0.1, 0.3, 0.6, 1.0, 2.0, 4.0])
+    found = simulate(controlled(saturated(), pid={**PID, "limits": [-6, 6], "tracking": 0.25}), times)
+    kept = found.model["signals"]
+    integral = [-3.94634969730199, -4.47499825725630, 2.12490565007416, 4.12080343144426, -0.143195181566589]
+    assert kept["pid_integral"][:5] == pytest.approx(integral, abs=1e-9)
+    assert found.velocities is not None
+    x, v = found.points[:, 0, 0, 0], found.velocities[:, 0, 0, 0]
+    wanted = 30 * (1 - x) + np.array(kept["pid_integral"]) - 9 * v
+    assert kept["pid_wanted"] == pytest.approx(wanted, abs=1e-9)
+    assert kept["loads.push.scale"] == kept["pid"] == pytest.approx(np.clip(wanted, -6, 6), abs=1e-9)

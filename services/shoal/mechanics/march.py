@@ -20,12 +20,12 @@ import numpy as np
 from numba import carray, njit, typeof, types
 
 from shoal.compile import function_pointers, simd, structures
-from shoal.compile.pointers import pointer, raw_type
+from shoal.compile.pointers import pointer, raw_type, shift
 from shoal.compile.structures import Reference
 from shoal.mechanics import constraints, gaps, kernels, signals, switch_events
 from shoal.mechanics import contact_events as events
 from shoal.mechanics.derived import derive
-from shoal.mechanics.dynamics import Work, loaded, remember
+from shoal.mechanics.dynamics import Work, instant, loaded, remember
 from shoal.mechanics.halts import RESOLUTION, Halts, elongations, leapt
 from shoal.mechanics.integrators.scheme import Scheme, advance, interpolate, restart
 from shoal.mechanics.least.work import HERE
@@ -195,6 +195,9 @@ def loop(frame):  # type: ignore[no-untyped-def]
         while sample < len(times) and times[sample] <= now + slack:
             _sample(tile, scheme, m, w, k, marker_rows, times[sample] - now, taken, slack, record.samples, sample)
             _keep_contacts(tile, m, w, record, sample, False)
+            if frame.outputs > 0:
+                kept = shift(record.signals, sample * frame.outputs * len(tile))
+                signals.follow(tile, m, w, instant(w, times[sample]), k.q, k.v, kept, signals.RECORD)
             sample += 1
         if own[SWITCH] > 0.0:
             own[SWITCH] = 0.0

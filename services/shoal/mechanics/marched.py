@@ -32,7 +32,8 @@ class Marched(NamedTuple):
 
     energy_error: largest |E + dissipated - E(0)| [J]; energy_scale: largest energy in motion [J], kinetic, of bent
     bodies and the size of that of springs; drift: largest violation of a constraint by its power of a length, (POWERS *
-    lanes,); contacts: see `gaps.keep`, (times * contacts * KEPT, lanes); begin: coordinates and rates at the start,
+    lanes,); contacts: see `gaps.keep`, (times * contacts * KEPT, lanes); signals: those
+    recorded, (times * outputs, lanes); begin: coordinates and rates at the start,
     made consistent, (2 * unknowns, lanes); ended, closeness, singular: as in `GaussWork` (near), (3 * lanes,) and
     (lanes,). Common to the lanes of a tile: steps taken, evaluations of the forces, the time reached [s].
     """
@@ -42,6 +43,7 @@ class Marched(NamedTuple):
     energy_scale: Array
     drift: Array
     contacts: Array
+    signals: Array
     begin: Array
     ended: Array
     closeness: Array
@@ -97,6 +99,7 @@ def rooms(tile: Tile, arrays: Arrays, times: int, marker_rows: Index) -> tuple[M
         np.zeros(width),
         np.zeros(constraints.POWERS * width),
         np.full(times * arrays.gaps.size * KEPT * width, np.nan),
+        np.full(times * (arrays.followed.outputs if arrays.followed else 0) * width, np.nan),
         np.zeros(2 * end),
         np.zeros(3 * width),
         np.zeros(width),
@@ -132,7 +135,7 @@ class Frame(NamedTuple):
     number of marker rows; halts: where steps end, `stops` times and `marks` marks; there forces may jump, and driven
     constraints their rates. tolerance: from which rows count as dependent. first_event: address of the kernel of
     `contact_events.first`, 0 for machines without contacts; first_switch: of `switch_events.first`, 0 where no signal
-    switches. What is not reached stays nan in the record.
+    switches. outputs: number of signals that are recorded. What is not reached stays nan in the record.
     """
 
     tile: Tile
@@ -153,6 +156,7 @@ class Frame(NamedTuple):
     tolerance: float
     first_event: int = 0
     first_switch: int = 0
+    outputs: int = 0
 
 
 def framed(
@@ -171,9 +175,10 @@ def framed(
     record, own = rooms(tile, arrays, len(times), marker_rows)
     sizes = len(times), marker_rows.size, halts.times.size, halts.marks.size
     samples, directed, stops, marks = sizes
+    outputs = arrays.followed.outputs if arrays.followed else 0
     return Frame(
         tile, scheme, arrays, room, own, record, step, steps, times, samples,
-        marker_rows, directed, halts, stops, marks, tolerance,
+        marker_rows, directed, halts, stops, marks, tolerance, outputs=outputs,
     )  # fmt: skip
 
 

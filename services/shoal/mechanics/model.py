@@ -171,6 +171,7 @@ class Model:
     signal_angles: Array
     signal_fields: tuple[str, ...]
     signal_names: tuple[str, ...]
+    recorded: tuple[str, ...]
     probed: tuple[int, ...]
     slowed: int = 0
     marker_angles: Array | None = None

@@ -108,6 +108,7 @@ class Runs:
         limits, floor = self._limits, self._limits.energy_floor(end)
         left: list[tuple[Array, Array, Array]] = []
         happened: list[dict[str, Any]] = []
+        recorded: dict[str, list[float]] = {}
         closed: list[str] = []
         unclear: list[str] = []
         words: list[list[tuple[float, str]]] = [[] for _ in range(moved.lanes)]
@@ -130,6 +131,7 @@ class Runs:
             if single:
                 left.append(space.left)
                 happened.extend(space.events)
+                recorded.update(space.recorded)
                 closed.extend(space.closed)
                 unclear.extend(space.unclear)
             if single not in self._found:
@@ -162,6 +164,7 @@ class Runs:
         largest = np.maximum.reduce(numbers, axis=1)
         facts = pickle.loads(self._found[single])
         facts["evaluations"] = int(largest[EVALUATIONS])
+        facts |= {"signals": recorded} if recorded else {}
         if self.model.gaps.size and single:
             facts["events"], facts["closed_contacts"] = happened, closed
             facts |= {"unclear_contacts": unclear} if unclear else {}

@@ -25,10 +25,10 @@ from shoal.mechanics.derived import derive, fold
 from shoal.mechanics.forces import Forces
 from shoal.mechanics.numerics.tile import Array, Index, Tile
 
-ACT, REMEMBER, LINEARISE, DERIVE, SETTLE, TURN = range(6)
+ACT, REMEMBER, LINEARISE, DERIVE, SETTLE, TURN, RECORD = range(7)
 """What the kernel does: evaluate all and add the loads to the forces; count the turns of angles; evaluate all and
-`linearise`; `linearise` what was evaluated last; set all switches that are held by their arguments; or turn those that
-are marked."""
+`linearise`; `linearise` what was evaluated last; set all switches that are held by their arguments; turn those that
+are marked; or evaluate all and copy what is recorded to f."""
 FORCE, BY_PLACE, BY_RATE = range(3)
 """What `linearise` makes of every strength."""
 BLOCKS = 3
@@ -39,9 +39,9 @@ class Signals(NamedTuple):
 
     measures: without any law. positions, velocities: rows of the state, and how many. functions: of time, by number.
     constant: (constants, lanes). code: of the tape, `size` instructions, whose results are the registers from `first`
-    on. strength: registers that loads follow, and how many. switch: instructions that
-    switch, and how many. applied, torques: loads, in whose lists of functions
-    registers stand; torques of the plane act along their measure, times the amplitude of its law.
+    on. strength: registers that loads follow, and how many; switch: instructions that switch; output: registers that
+    are recorded. applied, torques: loads, in whose lists of functions registers stand; torques of the plane act along
+    their measure, times the amplitude of its law.
     """
 
     measures: Forces
@@ -60,6 +60,8 @@ class Signals(NamedTuple):
     strengths: int
     switch: Index
     switches: int
+    output: Index
+    outputs: int
     applied: Applied
     torques: Forces
 
@@ -311,7 +313,10 @@ def _signals(tile, s, m, w, t, z, zdot, f, part):  # type: ignore[no-untyped-def
         return
     if part != DERIVE:
         evaluate(tile, s, m, w, t, z, zdot)
-    if part in (LINEARISE, DERIVE):
+    if part == RECORD:
+        for k in range(s.outputs):
+            copy(tile, f, k, _registers(tile, s, w.signals), s.output[k])
+    elif part in (LINEARISE, DERIVE):
         linearise(tile, s, m, w, z, zdot)
     else:
         act(tile, s, _registers(tile, s, w.signals), z, zdot, f, w.power, w.element)

@@ -140,6 +140,13 @@ class Workspace:
         return recorded(log, fields, gaps.closed if whole else np.zeros_like(gaps.closed))
 
     @property
+    def recorded(self) -> dict[str, list[float]]:
+        """Signals, states and loads that follow them at the sampled times, of a march of one lane."""
+        names, values = self._model.recorded, self.march.frame.record.signals
+        columns = values.reshape(-1, len(names)).T if names and len(values) else ()
+        return dict(zip(names, (column.tolist() for column in columns), strict=False))
+
+    @property
     def closed(self) -> list[str]:
         """Joints whose contacts are closed at the end of a march of one lane."""
         return self._named(self.march.frame.room.gaps.closed)

@@ -63,6 +63,7 @@ def build(
     rows = RowAllocator(len(placement.positions))
     masses = Masses(scene, placement, rows)
     loads, contacts = Loads(scene, placement, rows, horizon), Contacts(scene, placement, rows)
+    loads.signals.record()
     probed = tuple(loads.signals.strength("outputs", node) for node in probes)
     gaps = contacts.gaps(placement.terms.pressed)
     if gaps.size and loads.rubbing:
@@ -126,6 +127,7 @@ def build(
         signals=loads.followed(),
         signal_fields=tuple(following(stated)),
         signal_names=tuple(loads.signals.names),
+        recorded=tuple(loads.signals.outputs),
         probed=probed,
         signal_angles=stacked(loads.signals.measures.angles),
         method=principle.method(scene.solver.acceleration),

@@ -37,6 +37,8 @@ class SignalLoads:
         self.scene, self.measures, self._torques, self._fit = measures.scene, measures, torques, fit
         self._turning: list[int] = []
         self._strengths: list[Operand] = []
+        self.outputs: dict[str, Operand] = {}
+        """What is recorded: loads by their fields, states and signals by their names."""
         self._measured: dict[tuple[str, tuple[str, ...]], int] = {}
         self._rows: dict[str, list[int]] = {"position": [], "velocity": []}
         self._functions: list[int] = []
@@ -62,7 +64,20 @@ class SignalLoads:
         found = self._operand(field, node)
         if found not in self._strengths:
             self._strengths.append(found)
+        if field.startswith("loads."):
+            self.outputs[field] = found
         return self._strengths.index(found)
+
+    def record(self) -> None:
+        """Record beside what loads follow all states, and those signals that are evaluated anyway."""
+        for name in self.scene.states if self._strengths else ():
+            self.outputs[name] = self._operand(f"states.{name}", StateValue(name))
+        stated: dict[str, Any] = self.scene.signals
+        for name, one in stated.items():
+            if isinstance(one, SignalFunction) and one.number is None:
+                node = Table(name) if one.table is not None else written_out(self.scene, one)
+                if node in self._known:
+                    self.outputs[name] = self._known[node]
 
     def turn(self, name: str, first: Attachment, second: Attachment, strength: int) -> None:
         """Let a torque of the plane follow a strength."""
@@ -105,6 +120,8 @@ class SignalLoads:
             len(strengths),
             index(self._switches),
             len(self._switches),
+            index([register(one) for one in self.outputs.values()]),
+            len(self.outputs),
             applied(lambda strength: strengths[strength]),
             turned,
         )
