@@ -83,3 +83,12 @@ def test_geoms_without_contacts_are_counted_by_their_types(tmp_path: Path) -> No
     without = found(tmp_path, inside, contacts=False)
     assert "contacts" not in without.scene
     assert without.left_out[0] == "geoms: all that touch others, as asked"
+
+
+def test_bodies_between_joints_weigh_more_where_contacts_are(tmp_path: Path) -> None:
+    """1e-6 of what they carry in place of 1.5e-8: forces of contacts need less round-off, and less accuracy."""
+    inside = """<body name="a" pos="0 0 1"><joint name="h" axis="0 1 0" damping=".1"/><joint axis="1 0 0"/>
+      <geom size=".1" pos=".2 0 0" mass="2"/></body>"""
+    for contacts, part in ((True, 1e-6), (False, np.sqrt(np.finfo(float).eps))):
+        scene = found(tmp_path, inside, contacts=contacts).scene
+        assert scene["bodies"]["h-link"]["mass"] == pytest.approx(part * 2.0)

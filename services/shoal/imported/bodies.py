@@ -18,7 +18,7 @@ from shoal.imported.springs import resists
 
 def rigid(source: Source, body: int, parts: Parts) -> dict[str, Any]:
     """A rigid body: mass [kg], centre of mass [m], inertia [kg m^2] about that. Raises InputError if it cannot move."""
-    own, note, wrong = movable(source.moments[body], source.carried[body])
+    own, note, wrong = movable(source.moments[body], source.carried[body], parts.small)
     if wrong or not source.carried[body].mass:
         raise InputError(f"{source.names[body]}: {wrong or 'moves and has no mass; give it some, with an inertia'}")
     if note:
@@ -26,9 +26,9 @@ def rigid(source: Source, body: int, parts: Parts) -> dict[str, Any]:
     return _rigid(own)
 
 
-def light(source: Source, body: int) -> dict[str, Any]:
+def light(source: Source, body: int, parts: Parts) -> dict[str, Any]:
     """A rigid body between two joints of one, which weighs next to nothing."""
-    return _rigid(movable(Moments(), source.carried[body])[0])
+    return _rigid(movable(Moments(), source.carried[body], parts.small)[0])
 
 
 def _rigid(own: Moments) -> dict[str, Any]:

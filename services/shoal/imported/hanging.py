@@ -71,7 +71,7 @@ def _chain(source: Source, body: int, axes: Axes, parts: Parts) -> None:
         if not last:
             parts.between.add(owner)
             parts.origin[owner] = f"body {source.names[body]}"
-            parts.bodies[owner] = light(source, body)
+            parts.bodies[owner] = light(source, body, parts)
             parts.initial[owner] = initial(source, body, joints=number + 1)
         place = source.data.xanchor[one] if kind != kinds.mjJNT_SLIDE else source.data.xpos[body]
         local = source.axes(body).T @ (place - source.data.xpos[body])

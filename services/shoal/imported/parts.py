@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+from shoal.imported.composite import SMALL
+
 
 @dataclass
 class Parts:
@@ -25,6 +27,8 @@ class Parts:
     """A line for each assumption."""
     kept: set[int] = field(default_factory=set)
     """Equalities that joints stand for already, as MuJoCo counts them."""
+    small: float = SMALL
+    """Mass of a body without one, per mass that it carries."""
     between: set[str] = field(default_factory=set)
     """Bodies between joints of one body of the file."""
     away: dict[str, float] = field(default_factory=dict)

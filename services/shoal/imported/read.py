@@ -20,6 +20,7 @@ from shoal.imported.assets import do_without
 from shoal.imported.audit import MJCF, URDF, constraints, unread
 from shoal.imported.axes import Axes
 from shoal.imported.bodies import initial, is_mass, mass, rigid
+from shoal.imported.composite import SMALL, TOUCHING
 from shoal.imported.contacts import add_contacts
 from shoal.imported.equalities import add_equalities
 from shoal.imported.findings import findings
@@ -148,6 +149,11 @@ def _audit(file: Path, root: XmlElement, parts: Parts) -> None:
 
 def _parts(source: Source, contacts: bool) -> Parts:
     model, parts = source.model, Parts()
+    if contacts:
+        add_contacts(source, parts)
+        parts.small = TOUCHING if parts.contacts else SMALL
+    elif np.any(source.model.geom_contype | source.model.geom_conaffinity):
+        parts.left_out.append("geoms: all that touch others, as asked")
     # In a loop, axes of several bodies have to agree.
     loops, shared = np.any(model.eq_active0), Axes()
     for body in range(1, model.nbody):
@@ -165,10 +171,6 @@ def _parts(source: Source, contacts: bool) -> Parts:
     add_actuators(source, parts)
     if model.nflex:
         parts.miss(f"flexible bodies: {model.nflex}")
-    if contacts:
-        add_contacts(source, parts)
-    elif np.any(source.model.geom_contype | source.model.geom_conaffinity):
-        parts.left_out.append("geoms: all that touch others, as asked")
     parts.left_out += absent(source)
     return parts
 
