@@ -14,6 +14,7 @@ AccelerationUnit = Literal["m/s^2", "g"]
 ForceUnit = Literal["N", "kN", "mN"]
 TorqueUnit = Literal["N m", "mN m", "N mm"]
 StrainUnit = Literal["m/m", "um/m", "%"]
+TimeUnit = Literal["s", "ms", "us"]
 SI: dict[str, float] = {
     "m": 1.0,
     "cm": 1e-2,
@@ -28,6 +29,7 @@ SI: dict[str, float] = {
     **{"N": 1.0, "kN": 1e3, "mN": 1e-3},
     **{"N m": 1.0, "mN m": 1e-3, "N mm": 1e-3},
     **{"m/m": 1.0, "um/m": 1e-6, "%": 1e-2},
+    **{"s": 1.0, "ms": 1e-3, "us": 1e-6},
 }
 """What a unit is in those of SI; of a picture element the recording's `scale` tells the size."""
 TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0}

@@ -22,9 +22,11 @@ from shoal.identification.parametrization import Parametrization
 from shoal.identification.placement import AngleSensitivity, placement
 from shoal.identification.problem import Problem
 from shoal.identification.recording.clocks import by_clock
+from shoal.identification.recording.impacts import LATER, TINY, impact_times
 from shoal.identification.recording.measurement import Measurement, Recording
 from shoal.identification.recording.observation import Camera, observe, without_turns
 from shoal.identification.recording.rows import ResidualRows
+from shoal.identification.recording.source import IMPACT
 from shoal.identification.recording.virtual_sensors import engine_options, from_start, with_sensor_markers
 from shoal.mechanics.numerics.tile import WIDE
 from shoal.memory import Memory
@@ -170,6 +172,14 @@ class ForwardModel:
         seen = np.full((len(points), len(times), len(recording.channels)), np.nan)
         clock, delay = seen_by.pop("clock"), seen_by.pop("delay")
         possible = self._possible(points, values | {path: np.full(len(points), x) for path, x in fixed.items()}, scene)
+        if recording.channels[0].quantity == IMPACT:
+            lanes = np.flatnonzero(possible)
+            inputs = {path: numbers[lanes] for path, numbers in values.items()}
+            if lanes.size:
+                held, inputs = _with_shared(scene, fixed, inputs, len(lanes))
+                heard = self._heard(held, inputs, recording, times, clock[lanes], delay[lanes])
+                seen[lanes] = heard[:, recording.numbers(times), None]
+            return seen
         for lanes, instants, rows in by_clock(times, clock, delay, possible):
             inputs = {path: numbers[lanes] for path, numbers in values.items()}
             held, inputs = _with_shared(scene, fixed, inputs, len(lanes))
@@ -177,6 +187,29 @@ class ForwardModel:
             found = self._simulate(held, inputs, instants, view, name)
             seen[lanes] = np.take_along_axis(found, rows[:, :, None], axis=1)
         return seen
+
+    def _heard(
+        self, scene: Scene, values: dict[str, Array], recording: Recording, times: Array, clock: Array, delay: Array
+    ) -> Array:
+        """Times of all impacts by the recording's clock [s], (lanes, impacts); lanes that are refused stay nan."""
+        lanes, place = len(clock), recording.channels[0].place
+        count = int(recording.numbers(times[-1:])[0]) + 1
+        end = LATER * float(np.max(times[-1] / clock + delay))
+        try:
+            trajectory = self._run(scene, values, np.array([0.0, max(end, TINY)]), lanes, {})
+        except InputError as error:
+            asked = self.whole or self
+            self.refusal = asked.refusal = asked.refusal or str(error)
+            if lanes == 1:
+                return np.full((1, count), np.nan)
+            halves = (slice(0, lanes // 2), slice(lanes // 2, lanes))
+            parts = [({path: x[half] for path, x in values.items()}, clock[half], delay[half]) for half in halves]
+            return np.concatenate([self._heard(scene, v, recording, times, c, d) for v, c, d in parts])
+        if not trajectory.words:
+            raise InputError(f"channels: {IMPACT} is known to the engine gauss alone; found {trajectory.engine}")
+        found = np.stack([impact_times(letters, place, count, end) for letters in trajectory.words])
+        found[[status is not Status.OK for status in trajectory.status]] = np.nan
+        return (np.broadcast_to(found, (lanes, count)) - delay[:, None]) * clock[:, None]
 
     def _simulate(self, scene: Scene, values: dict[str, Array], times: Array, view: Camera, name: str) -> Array:
         """One call of the engine; lanes that it refuses are found by halving and stay nan."""

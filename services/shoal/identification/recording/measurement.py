@@ -6,11 +6,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from shoal.errors import InputError
 from shoal.identification.conventions import MAD, PRECISION
 from shoal.identification.recording.source import Channel, Clocked
 from shoal.trajectory import Array
+
+IntArray = npt.NDArray[np.intp]
 
 FEWEST = 3
 """Samples without which there is no motion: two show no acceleration."""
@@ -82,6 +85,11 @@ class Recording:
     def things(self) -> int:
         """Number of observed things: positions (x and y count as one), angles, and what sensors show."""
         return len({(c.place, c.to, "position" if c.is_position else c.quantity) for c in self.channels})
+
+    def numbers(self, times: Array) -> IntArray:
+        """Return the numbers, from 0, of samples at these times [s], those held out counted."""
+        known = np.unique(np.concatenate([self.times, *(one.times for one in self.held)]))
+        return np.searchsorted(known, times - 1e-12)
 
     def until(self, end: float) -> Recording:
         """The samples up to a time [s]."""

@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from shoal.errors import InputError
 from shoal.identification.recording.measurement import FEWEST, Recording, differences
-from shoal.identification.recording.source import Channel, FileSource, units_of
+from shoal.identification.recording.source import IMPACT, Channel, FileSource, units_of
 from shoal.identification.recording.swaps import mend
 from shoal.identification.recording.units import with_units
 from shoal.scene.load import read_yaml
@@ -79,7 +79,12 @@ def sampled(source: FileSource, channels: tuple[Channel, ...]) -> tuple[Recordin
     for column in (source.time, *(c.column for c in channels))[bool(source.rate) :]:
         table.require(column)
     times = _times(source, table)
-    begin = _begin(source, times)
+    heard = any(channel.quantity == IMPACT for channel in channels)
+    if heard and (len(channels) > 1 or source.every != 1):
+        raise InputError(
+            f"{path}: channels: times of impacts are a recording of one channel, of whose rows all are taken"
+        )
+    begin = _begin(source, times, heard)
     inside = _window(source, times, begin, path)
     columns = {name: table.numbers(name) for c in channels for name in (c.column, c.origin) if name is not None}
     for name, numbers in columns.items():
@@ -92,7 +97,7 @@ def sampled(source: FileSource, channels: tuple[Channel, ...]) -> tuple[Recordin
         turns[k] = whole_turns(signal[inside]) if channel.quantity == "angle" else 0.0
         signals.append(signal - turns[k])
         notes += note
-    values = np.column_stack(signals)
+    values = (times - begin)[:, None] if heard else np.column_stack(signals)
     for channel, signal in zip(channels, values[inside].T, strict=True):
         if not np.any(np.isfinite(signal[:: source.every])):
             raise InputError(f"{path}: column {channel.column!r} has no sample from {_span(times[inside])}")
@@ -132,10 +137,12 @@ def _times(source: FileSource, table: ColumnTable) -> Array:
     return times
 
 
-def _begin(source: FileSource, times: Array) -> float:
-    """When the motion's time is zero, by the table's clock [s]."""
+def _begin(source: FileSource, times: Array, heard: bool) -> float:
+    """When the motion's time is zero, by the table's clock [s]. heard: whether the rows are impacts."""
     if source.start is not None:
         return source.start
+    if heard:
+        return 0.0
     about = times[-1] > 0 and times[0] <= _ABOUT * (times[-1] - times[0])
     return 0.0 if about else float(times[0])
 

@@ -8,7 +8,15 @@ from typing import Annotated, Any, Literal, Self, get_args
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from shoal.scene.record import Angle, NonNegative, Positive, Record
-from shoal.table_units import AccelerationUnit, AngleUnit, ForceUnit, LengthUnit, StrainUnit, TorqueUnit
+from shoal.table_units import (
+    AccelerationUnit,
+    AngleUnit,
+    ForceUnit,
+    LengthUnit,
+    StrainUnit,
+    TimeUnit,
+    TorqueUnit,
+)
 
 Quantity = Literal[
     "x",
@@ -31,6 +39,7 @@ Quantity = Literal[
     "torque",
     "normal",
     "friction",
+    "impact",
     "strain",
 ]
 ACCELERATIONS: tuple[Quantity, ...] = ("ax", "ay", "az")
@@ -41,6 +50,8 @@ MOMENTS: tuple[Quantity, ...] = ("mx", "my", "mz")
 STRAIN: Quantity = "strain"
 PRESSING: tuple[Quantity, ...] = ("normal", "friction")
 """What a load cell below a contact shows along its normal and across it."""
+IMPACT: Quantity = "impact"
+"""The times of impacts, as a microphone hears them, one a row."""
 REACTIONS: tuple[Quantity, ...] = (*FORCES, *MOMENTS, "torque", *PRESSING)
 """What a load cell in a joint or below a contact shows."""
 IN_SPACE = ("z", "az", *RATES, "fz", *MOMENTS)
@@ -52,6 +63,7 @@ _UNITS: dict[str, Any] = {
     **dict.fromkeys((*FORCES, *PRESSING), ForceUnit),
     **dict.fromkeys((*MOMENTS, "torque"), TorqueUnit),
     STRAIN: StrainUnit,
+    IMPACT: TimeUnit,
 }
 
 
@@ -68,7 +80,8 @@ class Channel(Record):
     tilt may be a rotation vector. fx, fy [N], torque [N m]: what a `joint` exerts on its second body, along the axes of
     the ground, friction and drive included; in space fx, fy, fz, mx, my, mz, and of a drive the torque about its axis.
     fx, fy, in space fz, normal, friction [N]: what a `contact` exerts on its first body; friction is in the plane along
-    the normal turned clockwise, in space a size.
+    the normal turned clockwise, in space a size. impact [s]: the time of the n-th impact of a `contact`, or of a
+    `joint` with stops, in the n-th row; the times of the rows are the same.
     strain: of a flexible rod along its axis, at a marker and a `height` above the axis, in space a `side` of it
     towards the local z axis too [m].
 
@@ -94,7 +107,7 @@ class Channel(Record):
     scale: float = 1.0
     offset: float = 0.0
     origin: str | None = None
-    unit: LengthUnit | AngleUnit | AccelerationUnit | ForceUnit | TorqueUnit | StrainUnit | None = None
+    unit: LengthUnit | AngleUnit | AccelerationUnit | ForceUnit | TorqueUnit | StrainUnit | TimeUnit | None = None
     noise: Positive | None = None
 
     @model_validator(mode="after")
@@ -107,8 +120,8 @@ class Channel(Record):
     @model_validator(mode="after")
     def _somewhere(self) -> Self:
         named = [field for field in ("marker", "joint", "contact") if getattr(self, field)]
-        places = ["in a joint"] if self.quantity in REACTIONS and self.quantity not in PRESSING else []
-        places += ["at a contact"] if self.quantity in (*FORCES, *PRESSING) else []
+        in_joints, at_contacts = (*FORCES, *MOMENTS, "torque", IMPACT), (*FORCES, *PRESSING, IMPACT)
+        places = ["in a joint"] * (self.quantity in in_joints) + ["at a contact"] * (self.quantity in at_contacts)
         places = places or ["at a marker"]
         kinds = [one.rsplit(maxsplit=1)[-1] for one in places]
         if len(named) != 1 or named[0] not in kinds:
@@ -157,7 +170,7 @@ class Channel(Record):
     @property
     def is_sensor(self) -> bool:
         """Return whether a sensor on the machine shows it that knows no camera: of acceleration, force or strain."""
-        return self.quantity in (*ACCELERATIONS, *RATES, *REACTIONS, STRAIN)
+        return self.quantity in (*ACCELERATIONS, *RATES, *REACTIONS, STRAIN, IMPACT)
 
     @property
     def is_dynamic(self) -> bool:

@@ -16,7 +16,8 @@ QUANTITIES = {
     **{"x": "m", "y": "m", "z": "m", "angle": "rad", "rate": "rad/s"},
     **dict.fromkeys(("ax", "ay", "az"), "m/s²"),
     **dict.fromkeys(("wx", "wy", "wz"), "rad/s"),
-    **dict.fromkeys(("fx", "fy", "fz"), "N"),
+    **dict.fromkeys(("fx", "fy", "fz", "normal", "friction"), "N"),
+    "impact": "s",
     **dict.fromkeys(("mx", "my", "mz", "torque"), "N m"),
     "strain": "m/m",
 }
