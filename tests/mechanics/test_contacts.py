@@ -551,3 +551,16 @@ def test_friction_of_contacts_that_share_a_load_is_told_where_it_is_a_choice(oth
     assert [one.code for one in found.findings] == codes
     if not codes:
         assert found.marker("P")[-1, 0] == pytest.approx(2.0 * 0.5 - 0.5 * 0.3 * G * 0.25, abs=1e-10)
+
+
+@pytest.mark.parametrize(("left", "right", "mu"), [(0.41, 0.78, 0.36), (0.13, 1.03, 0.08), (0.96, 0.48, 0.5)])
+def test_a_body_in_a_notch_of_two_lines_rests_with_friction_that_suffices(left: float, right: float, mu: float) -> None:
+    """Of the forces that bear it, which are not unique, there are some with no friction at all."""
+    lines = {
+        name: {"first": {"body": "B"}, "second": {"body": "ground", "line": angle}, "mu": mu}
+        for name, angle in (("left", -left), ("right", right))
+    }
+    found = run(machine(POINT, lines, {"position": [0.02, 0.3]}, 3.0))
+    assert np.hypot(*found.points[0, 0, :, 0]) < 1e-9
+    assert len(found.model["events"]) < 40
+    assert {*found.model["closed_contacts"]} == {"left", "right"}

@@ -30,6 +30,8 @@ DEPENDENT = 1e-11
 """Pivot, over the largest entry, below which a direction depends on others: its force is zero."""
 UNCLEAR = 1e-6
 """Difference of accelerations, over what makes them up, by which forces that are not unique move a machine."""
+SHARES, RELIEF = 12, 0.5
+"""Times at which contacts that depend on each other are lowered, and by how much, as one is beyond its limit."""
 ANGLES = 32
 """Directions of slip in space that are tried, between which the one is bracketed."""
 
@@ -108,7 +110,8 @@ def hold(
     tangents, by direction; load: c, of a contact that gives way its
     force in place of that along the normal. near: forces of the same contacts, by direction and lane: where contacts
     depend on each other p is not unique, and of all the least in the sum of its squares, each over the normal force or
-    the limit of friction there, so that no contact is at its limit while others are not.
+    the limit of friction there, so that no contact is at its limit while others are not. Where one is beyond it, the
+    others take more.
     """
     ways, n = 1 + gaps.tangents, 0
     each = np.zeros(gaps.size * ways, np.int64)
@@ -120,31 +123,20 @@ def hold(
     _state(gaps, given, width, lane, mode, way, matrix, load, n, each, equations, right)
     unclear = False
     if solve(n, equations, right, found) < n:
-        other = found.copy()
-        scale, square, rest, multiplier = np.zeros(n), np.zeros(n * n), np.zeros(n), np.zeros(n)
+        other, scale, share = found.copy(), np.zeros(n), np.ones(n)
         for i in range(n):
             contact, k = each[i] // ways, each[i] % ways
             normal = abs(near[contact * ways * width + lane])
             most = limit(gaps, given, contact, width, lane, normal, True) if k > 0 else normal
             scale[i] = most if most < np.inf else normal
-        _state(gaps, given, width, lane, mode, way, matrix, load, n, each, equations, right)
-        for i in range(n):
-            rest[i] = right[i]
-            for j in range(n):
-                for k in range(n):
-                    square[i * n + j] += equations[i * n + k] * scale[k] ** 2 * equations[j * n + k]
-        solve(n, square, rest, multiplier)
-        for k in range(n):
-            found[k] = 0.0
-            for i in range(n):
-                found[k] += scale[k] ** 2 * equations[i * n + k] * multiplier[i]
-        # The equations are squared: what that leaves of them is taken out.
-        for i in range(n):
-            for j in range(n):
-                right[i] -= equations[i * n + j] * found[j]
-        solve(n, equations, right, rest)
-        for i in range(n):
-            found[i] += rest[i]
+        for _ in range(SHARES):
+            _state(gaps, given, width, lane, mode, way, matrix, load, n, each, equations, right)
+            _least(n, equations, right, scale * share, found)
+            if not _relieve(gaps, given, width, lane, mode, n, each, found, share):
+                break
+        else:  # there are no such forces: some slip
+            _state(gaps, given, width, lane, mode, way, matrix, load, n, each, equations, right)
+            _least(n, equations, right, scale, found)
         for i in range(n):
             change, whole = 0.0, 0.0
             for j in range(n):
@@ -155,6 +147,48 @@ def hold(
     for i in range(n):
         out[each[i]] = found[i]
     return unclear
+
+
+@njit(cache=True, error_model="numpy")
+def _least(n: int, equations: Array, right: Array, scale: Array, out: Array) -> None:
+    """Find the least solution of equations, (n, n) in rows, each unknown over its scale. Destroys both."""
+    square, rest, multiplier = np.zeros(n * n), np.zeros(n), np.zeros(n)
+    for i in range(n):
+        rest[i] = right[i]
+        for j in range(n):
+            for k in range(n):
+                square[i * n + j] += equations[i * n + k] * scale[k] ** 2 * equations[j * n + k]
+    solve(n, square, rest, multiplier)
+    for k in range(n):
+        out[k] = 0.0
+        for i in range(n):
+            out[k] += scale[k] ** 2 * equations[i * n + k] * multiplier[i]
+    # The equations are squared: what that leaves of them is taken out.
+    for i in range(n):
+        for j in range(n):
+            right[i] -= equations[i * n + j] * out[j]
+    solve(n, equations, right, rest)
+    for i in range(n):
+        out[i] += rest[i]
+
+
+@njit(cache=True, error_model="numpy")
+def _relieve(
+    gaps: Gaps, given: Array, width: int, lane: int, mode: Array, n: int, each: Index, found: Array, share: Array
+) -> bool:
+    """Lower the shares of contacts that stick beyond the limit of their friction; return whether there are some."""
+    ways, some = 1 + gaps.tangents, False
+    for i in range(n):
+        contact, square = each[i] // ways, 0.0
+        if each[i] % ways > 0 or mode[contact] != STICK or gaps.rubs[contact] == 0:
+            continue
+        for k in range(1, ways):
+            square += found[i + k] ** 2
+        if np.sqrt(square) > limit(gaps, given, contact, width, lane, found[i], True):
+            some = True
+            for k in range(1, ways):
+                share[i + k] *= RELIEF
+    return some
 
 
 @njit(cache=True, error_model="numpy")
