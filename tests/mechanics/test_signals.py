@@ -208,7 +208,12 @@ def test_a_saturation_costs_no_order() -> None:
 
 
 @pytest.mark.parametrize(
-    "scale", ["1 - 6*step(step(slide(rail) - 0.1) - 0.5)", "1 - 6*max(min(step(slide(rail) - 0.1), 3), 0.5) + 3*low"]
+    "scale",
+    [
+        "-2 - 3*sign(slide(rail) - 0.1)",
+        "1 - 6*step(step(slide(rail) - 0.1) - 0.5)",
+        "1 - 6*max(min(step(slide(rail) - 0.1), 3), 0.5) + 3*low",
+    ],
 )
 def test_switches_that_depend_on_switches(scale: str) -> None:
     data = on_rail(1.0, 0.0, scale, signals={"low": "1 - step(slide(rail) - 0.1)"})
@@ -425,3 +430,9 @@ def test_what_knows_no_signals_says_so() -> None:
         statics(Scene.parse(saturated()))
     with pytest.raises(InputError, match=r"loads.motor.torque: steady motions take no signals"):
         modes(scene.with_values({"initial.arm.rate": 1.0}))
+
+
+def test_what_a_swarm_cannot_weigh_is_refused() -> None:
+    swarm = {"solver.acceleration": "afsa", "solver.duration": 0.01, "solver.integrator": "auto"}
+    with pytest.raises(InputError, match=r"solver.acceleration: swarms know no states, as states.integral"):
+        get_engine("gauss").simulate(Scene.parse(saturated()).with_values(swarm))

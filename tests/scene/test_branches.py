@@ -94,7 +94,7 @@ _SMOOTH = st.recursive(
 _SWITCHED = st.recursive(
     _SMOOTH,
     lambda inner: (
-        st.builds("{}({})".format, st.sampled_from(["abs", "step", "ramp"]), inner)
+        st.builds("{}({})".format, st.sampled_from(["abs", "sign", "step", "ramp"]), inner)
         | st.builds("{}({}, {})".format, st.sampled_from(["min", "max"]), inner, inner)
         | st.builds("({} {} {})".format, inner, st.sampled_from("+-*"), inner)
     ),

@@ -95,6 +95,9 @@ class Workspace:
             raise InputError(
                 "solver.acceleration: swarms know no friction by the forces of joints (mu); use projection"
             )
+        if seek is not None and model.scene.states:
+            name = next(iter(model.scene.states))
+            raise InputError(f"solver.acceleration: swarms know no states, as states.{name}; use projection")
         self._model, self._part, self._tile = model, part, tile
         if seek is not None and model.gaps.size:
             raise InputError(

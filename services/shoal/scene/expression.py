@@ -1,7 +1,8 @@
 """Arithmetic expressions in named numbers, read without `eval`: what a user may write in a scene or a problem.
 
 There are numbers, names, + - * / **, the constants `pi` and `e` and the functions below; of these, step(x) is
-0 below 0 and 1 from 0 on, and ramp(x) goes from 0 at x = 0 to 1 at x = 1 with two continuous derivatives.
+0 below 0 and 1 from 0 on, sign(x) is -1, 0 or 1, and ramp(x) goes from 0 at x = 0 to 1 at x = 1 with two continuous
+derivatives.
 """
 
 from __future__ import annotations
@@ -37,6 +38,7 @@ ONE: dict[str, Callable[[Number], Number]] = {
     "exp": np.exp,
     "log": np.log,
     "abs": np.abs,
+    "sign": np.sign,
     "step": lambda x: np.heaviside(x, 1.0),
     "ramp": _ramp,
 }

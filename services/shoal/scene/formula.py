@@ -80,6 +80,8 @@ def _tree(node: Any) -> Node:
     if measured := expression.measured(node, MEASURES):
         return Measure(measured[0], measured[1:])
     name, arguments = node.func.id, [_tree(argument) for argument in node.args]
+    if name == "sign":  # which switches as two steps do
+        return make("-", make("step", *arguments), make("step", make("neg", *arguments)))
     return make(name, *arguments) if name in expression.ONE else reduce(lambda a, b: make(name, a, b), arguments)
 
 

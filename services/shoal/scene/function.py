@@ -33,7 +33,9 @@ class Function(Record):
     number: float | None = None
     """A constant [the unit of the field]."""
     expression: str | None = None
-    """Expression in `t` with `+ - * / **`, sin cos tan tanh sqrt exp log abs step ramp min max, pi and e."""
+    """Expression in `t` with `+ - * / **`, sin cos tan tanh sqrt exp log abs sign step ramp min max, pi
+    and e.
+    """
     table: tuple[tuple[float, float], ...] | None = None
     """Rows of time and value [s, the unit of the field] with increasing times. Outside its times a table keeps its end
     values.
