@@ -110,8 +110,13 @@ def following(scene: Any) -> list[str]:
     return sorted(found, key=lambda where: where.startswith("states."))
 
 
-def written_out(scene: Any, function: SignalFunction) -> Node:
-    """Return the tree of a function with the formulas of signals in place of their names."""
+def written_out(scene: Any, function: SignalFunction, known: Mapping[str, Node] | None = None) -> Node:
+    """Return the tree of a function with the formulas of signals in place of their names; known: see `expanded`."""
+    return _put(_tree(function), expanded(scene) if known is None else known)
+
+
+def expanded(scene: Any) -> dict[str, Node]:
+    """Return what stands in formulas for the names of signals and states."""
     known: dict[str, Node] = {name: StateValue(name) for name in scene.states}
     for name in _order(scene.signals):
         one = scene.signals[name]
@@ -119,7 +124,7 @@ def written_out(scene: Any, function: SignalFunction) -> Node:
             known[name] = Constant(name)
         else:
             known[name] = Table(name) if one.table is not None else _put(_tree(one), known)
-    return _put(_tree(function), known)
+    return known
 
 
 def depends_on_time(scene: Any, function: SignalFunction) -> bool:

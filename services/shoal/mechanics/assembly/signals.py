@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from shoal.scene import GROUND, Attachment, Function, SignalFunction, Slider
 from shoal.scene.formula import Measure, Node
 from shoal.scene.function import Formula
 from shoal.scene.joints import Z
-from shoal.scene.signals import Constant, StateValue, Table, is_of_time, joint_of, place, written_out
+from shoal.scene.signals import Constant, StateValue, Table, expanded, is_of_time, joint_of, place, written_out
 
 Operand = tuple[str, int]
 """A register: its section, and its number there."""
@@ -48,11 +49,15 @@ class SignalLoads:
         self._switches: list[int] = []
         self._known: dict[Node, Operand] = {}
 
+    @cached_property
+    def _expanded(self) -> dict[str, Node]:
+        return expanded(self.scene)
+
     def resolve(self, f: SignalFunction) -> tuple[Any, Node | None]:
         """Return a function of time, or the tree of what is none."""
         if f.of_time:
             return f, None
-        node = written_out(self.scene, f)
+        node = written_out(self.scene, f, self._expanded)
         if isinstance(node, Table):
             return self.scene.signals[node.name], None
         if isinstance(node, float):
@@ -75,7 +80,7 @@ class SignalLoads:
         stated: dict[str, Any] = self.scene.signals
         for name, one in stated.items():
             if isinstance(one, SignalFunction) and one.number is None:
-                node = Table(name) if one.table is not None else written_out(self.scene, one)
+                node = self._expanded[name]
                 if node in self._known:
                     self.outputs[name] = self._known[node]
 
