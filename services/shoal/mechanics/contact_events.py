@@ -14,7 +14,7 @@ from shoal.mechanics import kernels
 from shoal.mechanics.contact import response
 from shoal.mechanics.contact.impact import STILL, fastest
 from shoal.mechanics.dynamics import Work
-from shoal.mechanics.gaps import DRY, HIT, LIFT, PASS, RIGID, SLIDE, SLIP, STOP, is_outline
+from shoal.mechanics.gaps import DRY, HIT, LIFT, PASS, RIGID, SLIDE, SLIP, STICK, STOP, is_outline
 from shoal.mechanics.integrators.scheme import Scheme, interpolate
 from shoal.mechanics.marched import LoopRoom
 from shoal.mechanics.model import Arrays
@@ -226,6 +226,8 @@ def _root(
 ) -> float:  # fmt: skip
     """Return the fraction at which a quantity of one contact changes its sign between two (Chandrupatla 1997)."""
     width = len(tile)
+    # Gaps, their rates and slips follow from the motion; forces take an acceleration.
+    holding = holding and (what == FORCE or (what == MARGIN and w.gaps.mode[at] == STICK))
     _at(tile, scheme, m, w, k, t, left, taken, tolerance, holding)
     a, b, fb = right, left, _read(m, w, width, at, what)
     # A gap that begins at zero, but for round-off, closes where it falls below that.

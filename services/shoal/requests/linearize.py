@@ -44,8 +44,8 @@ class Linearize(OfScene):
     """Find the linear model x' = A x + B u, y = C x + D u of a scene, for the design of controllers."""
 
     inputs: Inputs
-    _: KW_ONLY
     outputs: Outputs = ()
+    _: KW_ONLY
     about: Annotated[
         Literal["equilibrium", "start", "trajectory"],
         Option("About the equilibrium, the start, or the state that the machine has moved to at --time."),

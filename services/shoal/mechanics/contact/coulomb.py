@@ -253,8 +253,12 @@ def decide(
     n = gaps.size * ways
     rest, begun, asked = np.zeros(n), np.zeros(n), np.zeros(gaps.size)
     outcome, change, largest = FINE, np.inf, 0.0
+    each, some = np.zeros(n, np.int64), 0
     for contact in range(gaps.size):
         asked[contact] = mode[contact]
+        for row in range(contact * ways, (contact + 1) * ways):
+            if asked[contact] != OPEN:
+                each[some], some = row, some + 1
     for i in range(n):
         out[i] = 0.0
     for _ in range(SWEEPS):
@@ -266,7 +270,8 @@ def decide(
             for k in range(ways):
                 row = first + k
                 rest[row], begun[row] = load[row], out[row]
-                for j in range(n):
+                for i in range(some):
+                    j = each[i]
                     if j < first or j >= first + ways:
                         rest[row] += matrix[row * n + j] * out[j]
             if gaps.soft[contact] != RIGID:

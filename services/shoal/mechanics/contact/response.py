@@ -82,15 +82,19 @@ def _project(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, to
 def matrix(tile: Tile, m: Arrays, w: Work, lane: int, wanted: Array) -> None:
     """G of the contacts wanted in one lane into w.gaps.matrix, 1 on the diagonal of all other directions."""
     g, width, n, ways = w.gaps, len(tile), m.unknowns, 1 + m.gaps.tangents
-    size = m.gaps.size * ways
+    size, known, some = m.gaps.size * ways, np.zeros(m.gaps.size * ways, np.int64), 0
+    for i in range(size * size):
+        g.matrix[i] = 0.0
     for i in range(size):
-        known = wanted[i // ways * width + lane] != 0.0 and has(m.gaps, i // ways, i % ways)
-        for j in range(size):
-            total = 1.0 if i == j else 0.0
-            if known and wanted[j // ways * width + lane] != 0.0 and has(m.gaps, j // ways, j % ways):
-                total = 0.0
-                for k in range(n):
-                    total += g.gradient[(i * n + k) * width + lane] * g.response[(j * n + k) * width + lane]
+        if wanted[i // ways * width + lane] != 0.0 and has(m.gaps, i // ways, i % ways):
+            known[some], some = i, some + 1
+        else:
+            g.matrix[i * size + i] = 1.0
+    for i in known[:some]:
+        for j in known[:some]:
+            total = 0.0
+            for k in range(n):
+                total += g.gradient[(i * n + k) * width + lane] * g.response[(j * n + k) * width + lane]
             g.matrix[i * size + j] = total
 
 
