@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from shoal.response.expansion import Expansion, fit
+from shoal.response.expansion import WORSE, Expansion, fit
 from shoal.response.extremes import MOST_CORNERS, corners
 from shoal.response.inputs import BoolArray, Inputs, IntArray
 from shoal.response.polynomials import size, total_degree
@@ -32,7 +32,7 @@ NEAR = 2.0
 """A word counts at a place where a run of it is nearer than the nearest of all, times this."""
 TOGETHER = 1e-6
 """Distance of runs of different words (the box is 2 wide) below which they are not halved further."""
-ROUNDS = 24
+ROUNDS = 12
 MORE = 16
 """Times the fair number of runs that are made at most."""
 HIGHEST = 20
@@ -55,7 +55,7 @@ def by_word(study: Study) -> Found:
     """Bound the answers. Runs of different words there are already, see `differ`."""
     most = min(study.runs.left, MORE * study.fair)
     wanted = FINE_GAP if study.gap is None else study.gap
-    each = max(2 * len(study.inputs), study.fair // 4)
+    each = max(2 * len(study.inputs), study.fair // 2)
     made, unseen = study.runs.evaluations, np.zeros(study.runs.values.shape[1])
     looked = _look(study, unseen)
     for _ in range(ROUNDS):
@@ -96,7 +96,8 @@ class _Looked:
     """Bounds: lower, upper that runs attain, low, high with what the polynomials are off by, gap, error, (columns,).
 
     places: where runs promise to widen the bounds, the best first; sparse: that are farthest from the runs of their
-    word, denser towards the ends of its part as polynomials need it; pieces: by instant and word
+    word, denser towards the ends of its part as polynomials need it; pieces: instants, their words, columns and
+    polynomials of each part
     """
 
     lower: Array
@@ -107,15 +108,15 @@ class _Looked:
     error: Array
     places: Array
     sparse: Array
-    pieces: dict[tuple[int, float], tuple[IntArray, _Piece]]
+    pieces: list[tuple[IntArray, Array, IntArray, _Piece]]
 
     def missed(self, study: Study, first: int) -> Array:
         """Return the largest error at the runs from number `first` on, (columns,)."""
         words, xi, values = study.runs.words, study.runs.xi[first:], study.runs.values[first:]
         assert words is not None
         found = np.zeros(values.shape[1])
-        for (instant, word), (columns, piece) in self.pieces.items():
-            mine = words[first:, instant] == word
+        for instants, word, columns, piece in self.pieces:
+            mine = np.all(words[first:, instants] == word, axis=1)
             if mine.any():
                 off = np.abs(piece(xi[mine]) - values[mine][:, columns])
                 found[columns] = np.maximum(found[columns], off.max(axis=0))
@@ -131,10 +132,10 @@ def _look(study: Study, unseen: Array) -> _Looked:
     low, high, error = lower.copy(), upper.copy(), unseen.copy()
     width = study.widths(values)
     scanned = inputs.sobol(PLACES, study.seed + 1)
-    promise, away, pieces = np.zeros(PLACES), np.zeros(PLACES), dict[tuple[int, float], tuple[IntArray, _Piece]]()
-    for instant, when in enumerate(study.when):
-        columns = np.flatnonzero(study.instants == when)
-        here = words[:, instant]
+    promise, away, pieces = np.zeros(PLACES), np.zeros(PLACES), list[tuple[IntArray, Array, IntArray, _Piece]]()
+    for instants in _alike(words):
+        columns = np.flatnonzero(np.isin(study.instants, study.when[instants]))
+        here = words[:, instants[0]]
         if len(np.unique(here)) > MANY:
             low[columns], high[columns] = -np.inf, np.inf
             continue
@@ -146,7 +147,7 @@ def _look(study: Study, unseen: Array) -> _Looked:
                 spread = np.maximum(width[columns], 1e-300)
                 low[columns], high[columns] = low[columns] - spread, high[columns] + spread
                 continue
-            pieces[instant, word] = columns, piece
+            pieces.append((instants, words[mine][0, instants], columns, piece))
             off = np.maximum(piece.expansion.left_out, unseen[columns])
             error[columns] = np.maximum(error[columns], off)
             predicted = piece(scanned[possible])
@@ -165,10 +166,18 @@ def _look(study: Study, unseen: Array) -> _Looked:
     return _Looked(lower, upper, low, high, gap, error, scanned[order[promise[order] > 0.0]], _apart(sparse), pieces)
 
 
+def _alike(words: Array) -> list[IntArray]:
+    """Return the instants at which words divide the runs alike, as between two events, together."""
+    parts: dict[bytes, list[int]] = {}
+    for instant, column in enumerate(words.T):
+        parts.setdefault(np.unique(column, return_inverse=True)[1].tobytes(), []).append(instant)
+    return [np.array(instants) for instants in parts.values()]
+
+
 def _apart(places: Array) -> Array:
     """Return the first of some places that are not near to each other."""
     chosen: list[Array] = []
-    for place in places:
+    for place in places[: 4 * SPARSE]:
         if all(np.max(np.abs(place - one)) > APART for one in chosen):
             chosen.append(place)
         if len(chosen) == SPARSE:
@@ -199,7 +208,7 @@ def _fitted(inputs: Inputs, xi: Array, values: Array) -> _Piece | None:
     """Return polynomials of each column's best degree on the box around some runs; None for too few runs."""
     low, high = xi.min(axis=0), xi.max(axis=0)
     half = np.maximum(0.5 * (high - low), TOGETHER)
-    middle, best = 0.5 * (low + high), None
+    middle, best, worse = 0.5 * (low + high), None, 0
     for degree in range(1, HIGHEST + 1):
         if PER_TERM * size(len(inputs), degree) > len(xi):
             break
@@ -207,7 +216,10 @@ def _fitted(inputs: Inputs, xi: Array, values: Array) -> _Piece | None:
         if best is None:
             best = found
         elif found.whole:
-            best = found.where(found.left_out < best.left_out, best)
+            better = found.left_out < best.left_out
+            best, worse = found.where(better, best), 0 if better.any() else worse + 1
+        if worse == WORSE:
+            break
     return None if best is None or not best.whole else _Piece(middle, half, best)
 
 
