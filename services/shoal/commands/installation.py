@@ -86,7 +86,7 @@ def export(asked: Export, out: Out) -> None:
 def import_scene(
     file: Path, partial: bool, root: Any, stated: tuple[str, ...], no_contacts: bool, out: Out, as_json: bool
 ) -> None:
-    """Write the machine of FILE (URDF, or MuJoCo's MJCF) as a scene. What became what is listed on stderr."""
+    """Write the machine of FILE (URDF, SDF or MuJoCo's MJCF) as a scene. What became what is listed on stderr."""
     import yaml
 
     from shoal.errors import InputError

@@ -82,6 +82,7 @@ URDF: Known = {
     "inertial/inertia": _of("ixx ixy ixz iyy iyz izz"),
     "robot/joint": _of("name type"),
     "joint/origin": _of("xyz rpy"),
+    "joint/within": _of("xyz rpy"),
     "joint/parent": _of("link"),
     "joint/child": _of("link"),
     "joint/axis": _of("xyz"),

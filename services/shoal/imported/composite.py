@@ -11,6 +11,8 @@ from shoal.imported.rounding import ROUNDED, Array
 SMALL = float(np.sqrt(np.finfo(float).eps))
 """Mass of a body without one, per mass that it carries, 1.5e-8: accelerations change by as much, and their round-off is
 eps over it."""
+LEAST = 2e-14
+"""Moment of inertia [kg m^2] that MuJoCo takes; it refuses less than 1e-14."""
 TOUCHING = 1e-6
 """The same in machines with contacts, whose events ask for forces without so much round-off: a humanoid of 38 contacts
 moves through 37 events, and with 1e-7 makes no headway between the first ones."""
@@ -71,7 +73,7 @@ def movable(own: Moments, carried: Moments, small: float = SMALL) -> tuple[Momen
     values, axes = np.linalg.eigh(own.inertia)
     if values[0] < -ROUNDED * abs(values[2]):
         return own, "", f"its moment of inertia {values[0]:.3g} kg m^2 is negative"
-    least = small * own.mass * own.size**2
+    least = max(small * own.mass * own.size**2, LEAST)
     if values[0] >= least / 2 and values[2] <= (1.0 + ROUNDED) * (values[0] + values[1]):
         return own, "", ""
     # Second moments along the axes: of a mass in one point none, of a thin rod one, of no body a negative one.

@@ -37,7 +37,7 @@ ASSUMED = Kind(
 _WORDS = (
     (re.compile(r"touch others|<collision>|contact pairs|<exclude>"), CONTACTS),
     (re.compile(r"its limits|<safety_controller>"), LIMITS),
-    (re.compile(r"^actuators|damping|its spring|its part|the part|armature|frictionloss|springyield|yields"), FORCES),
+    (re.compile(r"^actuators|damping|its spring|<spring_stiffness>|the part|armature|frictionloss|yield"), FORCES),
     (re.compile(r"gravity compensation|the medium|plugins|<transmission>|wind"), FORCES),
 )
 """Words of lines on what is left out, and what they change; others change no motion."""

@@ -30,6 +30,7 @@ from shoal.imported.markup import XmlElement, parse, with_includes
 from shoal.imported.packages import expand
 from shoal.imported.parts import Parts
 from shoal.imported.rounding import numbers
+from shoal.imported.sdf import as_urdf
 from shoal.imported.source import Source
 from shoal.imported.springs import add_resistance
 from shoal.imported.switches import switch_off
@@ -72,12 +73,14 @@ class Loaded:
 
 
 def load(file: Path, root: Root | None = None, arguments: Mapping[str, str] | None = None) -> Loaded:
-    """Return the model of a URDF or MJCF file. Raises InputError. For the arguments see `read`."""
+    """Return the model of a URDF, SDF or MJCF file. Raises InputError. For the arguments see `read`."""
     import mujoco
 
     if not file.is_file():
         raise InputError(f"{file}: no such file")
     xml = parse(file, file.read_bytes())
+    if xml.tag == "sdf":
+        xml = as_urdf(file, xml)
     if file.suffix == ".xacro" or any(one.tag.startswith("xacro:") for one in xml.walk()):
         xml = parse(file, expand(file, arguments or {}))
     with warnings.catch_warnings(record=True, action="always") as told:
@@ -89,7 +92,7 @@ def load(file: Path, root: Root | None = None, arguments: Mapping[str, str] | No
 def read(
     file: Path, root: Root | None = None, arguments: Mapping[str, str] | None = None, *, contacts: bool = True
 ) -> Imported:
-    """Return the scene of a URDF or MJCF file at its own start, in metres, kilograms, seconds and radians.
+    """Return the scene of a URDF, SDF or MJCF file at its own start, in metres, kilograms, seconds and radians.
 
     root: whether the ground holds the root of a URDF file; by default it does if anything else moves. arguments: of
     macros of xacro. contacts: whether those of geoms are wanted. Raises InputError if there is no such file, if it is

@@ -42,6 +42,11 @@ class Pose:
     turn: Array = field(default_factory=lambda: np.eye(3))
     place: Array = field(default_factory=lambda: np.zeros(3))
 
+    @property
+    def inverse(self) -> Pose:
+        """Return the pose of the other frame in this one."""
+        return Pose(self.turn.T, -self.turn.T @ self.place)
+
     def then(self, other: Pose) -> Pose:
         """Return the pose of a frame that is posed so in this one."""
         return Pose(self.turn @ other.turn, self.turn @ other.place + self.place)
@@ -49,7 +54,7 @@ class Pose:
 
 @dataclass(frozen=True)
 class UrdfJoint:
-    """A joint between two links; pose: of its frame, which is the child's, in the parent."""
+    """A joint between two links. pose: of its frame in the parent; within: in the child, whose own it is in URDF."""
 
     element: XmlElement
     name: str
@@ -58,6 +63,7 @@ class UrdfJoint:
     child: str
     pose: Pose
     axis: Array
+    within: Pose = field(default_factory=Pose)
 
 
 @dataclass
@@ -120,7 +126,7 @@ def urdf_robot(mujoco: Any, file: Path, root: XmlElement, held: Root | None) -> 
     _couple(mujoco, joints, robot)
     for one in closing:
         sides = one.parent, one.child
-        robot.loops.append(_loop(one.element, one.name, one.kind, sides, (one.pose, Pose()), one.axis, frames))
+        robot.loops.append(_loop(one.element, one.name, one.kind, sides, (one.pose, one.within), one.axis, frames))
     for element in root.named("loop_joint"):
         robot.loops += _stated_loop(file, element, links, frames)
     return robot
@@ -172,7 +178,8 @@ def _joints(file: Path, root: XmlElement) -> list[UrdfJoint]:
             next((one.attributes.get("link", "") for one in element.named(side)), "") for side in ("parent", "child")
         )
         name, pose = element.attributes.get("name") or f"joint{number}", _pose(file, _inside(element, "origin"))
-        found.append(UrdfJoint(element, name, kind, parent, child, pose, axis))
+        within = _pose(file, _inside(element, "within"))
+        found.append(UrdfJoint(element, name, kind, parent, child, pose, axis, within))
     return found
 
 
@@ -211,7 +218,7 @@ def _composites(tree: dict[str, UrdfJoint], roots: list[str], floats: bool) -> d
         name, body, pose = waiting.pop(0)
         body.members[name] = pose
         for one in below.get(name, []):
-            there = pose.then(one.pose)
+            there = pose.then(one.pose).then(one.within.inverse)
             if one.kind == "fixed":
                 waiting.append((one.child, body, there))
             else:
@@ -392,7 +399,7 @@ def _add_joints(mujoco: Any, file: Path, body: Composite, made: Any, robot: Robo
     if joint is None:
         made.add_freejoint(name=f"{body.name}-root")
         return
-    axis = joint.axis
+    axis = joint.within.turn @ joint.axis
     freedom = _FREEDOMS[joint.kind]
     if freedom == "planar":
         across = np.linalg.svd(axis[None])[2][1:]
@@ -402,7 +409,7 @@ def _add_joints(mujoco: Any, file: Path, body: Composite, made: Any, robot: Robo
         ways = [(joint.name, getattr(kinds, f"mjJNT_{freedom.upper()}"), axis)]
     damping, friction = _resistance(file, joint)
     for name, kind, along in ways:
-        one = made.add_joint(name=name, type=kind, axis=along, frictionloss=friction)
+        one = made.add_joint(name=name, type=kind, pos=joint.within.place, axis=along, frictionloss=friction)
         one.damping[0] = damping
         if (limit := _inside(joint.element, "limit")) is not None and joint.kind in ("revolute", "prismatic"):
             low, high = (float(numbers_of(file, limit, word, "0", 1)[0]) for word in ("lower", "upper"))
