@@ -197,6 +197,16 @@ def margin(tile: Tile, s: Signals, w: Any, number: int) -> float:
 
 
 @njit(cache=True, error_model="numpy")
+def is_far(tile: Tile, s: Signals, w: Any) -> bool:
+    """Return whether every switch is farther from its turn, at both ends of a step, than the step has moved it."""
+    for number in range(s.switches):
+        begin, end = _branches(tile, s, w.signals)[3 * s.switches + number], margin(tile, s, w, number)
+        if not min(begin, end) > abs(end - begin):
+            return False
+    return True
+
+
+@njit(cache=True, error_model="numpy")
 def mark(tile: Tile, s: Signals, w: Any, number: int, turns: bool) -> None:
     """Mark a switch as one that turns, or as none."""
     _branches(tile, s, w.signals)[s.switches + number] = 1.0 if turns else 0.0

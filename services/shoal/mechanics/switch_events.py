@@ -1,8 +1,9 @@
 """Switches of signals as events: steps end where an argument of abs, step, min or max changes its sign.
 
-Within a step every switch is held, so that all stages see one smooth law. The signs are compared with what is held at
-two places inside the step and at its end; the first root is bracketed on the dense output, and the step is repeated up
-to there (Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, section II.6, driving a switch).
+Within a step every switch is held, so that all stages see one smooth law. Where one could have turned, the signs are
+compared with what is held at two places inside the step and at its end; the first root is bracketed on the dense
+output, and the step is repeated up to there (Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I,
+section II.6, driving a switch).
 """
 
 from __future__ import annotations
@@ -34,6 +35,10 @@ def first(tile: Tile, s: Signals, scheme: Scheme, m: Arrays, w: Work, k: LoopRoo
     t: beginning of the step [s]; taken: its length. Of one lane.
     """
     left, found = 0.0, NEVER
+    _at(tile, s, scheme, m, w, k, t, 1.0, taken)
+    if signals.is_far(tile, s, w):
+        signals.learn(tile, s, w)
+        return found
     for right in PLACES:
         _at(tile, s, scheme, m, w, k, t, right, taken)
         for number in range(s.switches):
