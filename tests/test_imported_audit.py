@@ -177,6 +177,8 @@ SILENT = {"mujoco@model", "numeric@name", "texture@width", "texture@height", "vi
     *("exclude@body1", "exclude@body2", "motor@joint", "jointpos@joint", "gazebo/material", "gazebo@reference"),
     *("safety_controller@k_velocity", "body.still@name", "body.still@pos"),
     *("geom.still@pos", "geom.still@type"),
+    # Of contacts, which a flag of this file disables.
+    *("contact/exclude", "mujoco/contact", "geom@condim", "geom@friction"),
     # Defaults, and names that nothing refers to.
     *("key@qpos", "robot@name", "robot/link"),
 }

@@ -210,6 +210,10 @@ def test_macros_are_written_out(tmp_path: Path) -> None:
     done = CliRunner().invoke(main, ["import", str(path), "--argument", "mass=2.5", "--out", str(out)])
     assert done.exit_code == 0, done.stderr
     assert yaml.safe_load(out.read_text())["bodies"]["arm"]["mass"] == 2.5
+    stated = '<xacro:arg name="mass" default="1"/>'
+    path.write_text(path.read_text().replace(stated, ""))
+    with pytest.raises(InputError, match="argument mass; state it by --argument mass=VALUE"):
+        read(path)
     path.write_text(path.read_text().replace("parts", "nowhere"))
     with pytest.raises(InputError, match=r"xacro: .*find nowhere.*no such package"):
         read(path)
@@ -244,3 +248,12 @@ def test_a_joint_that_mimics_another_follows_it(tmp_path: Path) -> None:
     ours = moved(found.scene, [0.2])
     for name in ("one", "two"):
         assert ours.marker(name)[0] == pytest.approx(data.body(name).xpos, abs=1e-6)
+
+
+def test_options_of_other_files_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "arm.xml"
+    path.write_text('<mujoco><worldbody><body><joint/><geom size=".1"/></body></worldbody></mujoco>')
+    with pytest.raises(InputError, match="root: MJCF states whether bodies are free"):
+        read(path, "floating")
+    with pytest.raises(InputError, match="argument: has no macros that take 'mass'"):
+        read(written(tmp_path, ARM + joint("j", "world", "arm")), arguments={"mass": "1"})

@@ -27,7 +27,7 @@ def add_actuators(source: Source, parts: Parts) -> None:
             called = name if name not in parts.loads else f"{name}-push"
             parts.loads[called], parts.origin[f"loads.{called}"] = load, f"actuator {name}"
     if left:
-        parts.left_out.append(f"actuators: {len(left)}; {', '.join(left)} move or hold nothing")
+        parts.left_out.append(f"actuators: {len(left)}; what they do moves or holds the machine: {', '.join(left)}")
 
 
 def _load(source: Source, number: int) -> dict[str, Any] | None:

@@ -53,7 +53,8 @@ MJCF: Known = {
     ),
     "freejoint": _of("name align"),
     "geom": _of(
-        f"name class type contype conaffinity size mass density shellinertia fromto mesh fitscale hfield {_POSE}"
+        f"name class type contype conaffinity size mass density shellinertia fromto mesh fitscale hfield {_POSE} "
+        "friction condim priority"
     ),
     "site": _of(f"name class fromto {_POSE}"),
     "spatial": _TENDON,
@@ -66,6 +67,7 @@ MJCF: Known = {
     "weld": _of(_EQUALITY + "body1 body2 anchor relpose site1 site2 torquescale"),
     "equality/joint": _of(_EQUALITY + "joint1 joint2 polycoef"),
     "equality/tendon": _of(_EQUALITY + "tendon1 tendon2 polycoef"),
+    "contact/exclude": _of("name class body1 body2"),
     "equality/flex": _WHOLE,
     "flexvert": _WHOLE,
     "flexstrain": _WHOLE,
@@ -100,8 +102,7 @@ _OF_TYPES = {
 _CARRY_NOTHING = ("transmission", "collision_filter_group", "ros2_control", "disable_collisions", "sensor", "material")
 """Elements beside links and joints that name several and hold none together: drives, sensors, pairs without contact."""
 _REASONS = {
-    "collision": "a scene has no contacts",
-    "exclude": "a scene has no contacts",
+    "collision": "shapes of URDF are no contacts",
     **dict.fromkeys(("visual", "material", "texture", "skin"), "drawn only"),
 }
 

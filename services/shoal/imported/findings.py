@@ -35,7 +35,7 @@ ASSUMED = Kind(
     "file-leaves-open", Severity.NOTE, "What the file leaves open, or states as no body can have it, was assumed.",
 )  # fmt: skip
 _WORDS = (
-    (re.compile(r"touch others|<collision>|contact pairs|<exclude>"), CONTACTS),
+    (re.compile(r"touch others|<collision>|contact pairs"), CONTACTS),
     (re.compile(r"its limits|<safety_controller>"), LIMITS),
     (re.compile(r"^actuators|damping|its spring|<spring_stiffness>|the part|armature|frictionloss|yield"), FORCES),
     (re.compile(r"gravity compensation|the medium|plugins|<transmission>|wind"), FORCES),

@@ -9,6 +9,7 @@ from xml.etree import ElementTree
 
 from shoal.errors import InputError
 
+_UNSTATED = "Undefined substitution argument "
 _PREFIXES = ("package://", "model://")
 
 
@@ -59,7 +60,9 @@ def expand(file: Path, arguments: Mapping[str, str]) -> bytes:
         return bytes(xacro.process_file(str(file), mappings=dict(arguments)).toprettyxml(encoding="utf-8"))
     except Exception as error:  # of expressions of the file, thus of any kind
         said = " ".join(str(error).split()) or type(error).__name__
-        raise InputError(f"{file}: xacro: {said[:300]}") from None
+        name = said.removeprefix(_UNSTATED)
+        hint = f"; state it by --argument {name}=VALUE" if name != said else ""
+        raise InputError(f"{file}: xacro: {said[:300]}{hint}") from None
     finally:
         substitution_args._eval_find = substitution_args._eval_dict["find"] = before
 

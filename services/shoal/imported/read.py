@@ -83,6 +83,10 @@ def load(file: Path, root: Root | None = None, arguments: Mapping[str, str] | No
         xml = as_urdf(file, xml)
     if file.suffix == ".xacro" or any(one.tag.startswith("xacro:") for one in xml.walk()):
         xml = parse(file, expand(file, arguments or {}))
+    elif arguments:
+        raise InputError(f"{file}: argument: has no macros that take {next(iter(arguments))!r}")
+    if root is not None and xml.tag != "robot":
+        raise InputError(f"{file}: root: MJCF states whether bodies are free; leave it out")
     with warnings.catch_warnings(record=True, action="always") as told:
         robot = urdf_robot(mujoco, file, xml, root) if xml.tag == "robot" else _mjcf(mujoco, file, xml)
         model = _compiled(file, robot.spec)
