@@ -131,7 +131,8 @@ class Runs:
             if single:
                 left.append(space.left)
                 happened.extend(space.events)
-                recorded.update(space.recorded)
+                if moved.recorded:
+                    recorded.update(space.recorded)
                 closed.extend(space.closed)
                 unclear.extend(space.unclear)
             if single not in self._found:

@@ -145,9 +145,9 @@ class Workspace:
     @property
     def recorded(self) -> dict[str, list[float]]:
         """Signals, states and loads that follow them at the sampled times, of a march of one lane."""
-        names, values = self._model.recorded, self.march.frame.record.signals
-        columns = values.reshape(-1, len(names)).T if names and len(values) else ()
-        return dict(zip(names, (column.tolist() for column in columns), strict=False))
+        names = self._model.recorded
+        columns = self.march.frame.record.signals.reshape(-1, max(1, len(names))).T.tolist()
+        return dict(zip(names, columns, strict=False))
 
     @property
     def closed(self) -> list[str]:
