@@ -67,6 +67,7 @@ STUDIES: dict[str, Study] = {
     "right-models": Study("suspects --kind right --seeds 0:200", ("verdict-charts.md",), "right-models"),
     "selection": Study("selection", ("model-choice.md",)),
     "uncertain": Study("uncertain", ("uncertain-charts.md",)),
+    "contacts-identification": Study("coverage.impacts", ("contact-checks.md",)),
     "contacts-precision": Study("contacts.precision", ("contact-checks.md",)),
     "gallery": Study("gallery", ("gallery.md",)),
     "random-chains": Study("random_space --seeds 0:200", ("validation.md",), counts=True),

@@ -100,12 +100,12 @@ def trial(seed: int) -> Trial:
     except ShoalError as error:
         return Trial(seed, drawn.scene.name, type(error).__name__, str(error), {})
     right = {name: value for name, value in found.parameters.items() if found.verdict.trusted and value.identifiable}
-    errors = {name: _error(value, drawn.truth[name]) for name, value in right.items()}
+    errors = {name: over_interval(value, drawn.truth[name]) for name, value in right.items()}
     return Trial(seed, drawn.scene.name, str(found.verdict), found.message, errors)
 
 
-def _error(found: Value, truth: float) -> float:
-    """Over the side of the interval where the truth is; infinite where that side has no width."""
+def over_interval(found: Value, truth: float) -> float:
+    """Return an error over the side of the interval where the truth is; infinite where that side has no width."""
     side = found.upper - found.value if truth > found.value else found.value - found.lower
     return abs(truth - found.value) / side if side > 0 else np.inf
 

@@ -46,33 +46,31 @@ def swung(stop: float, kept: float, count: int) -> Array:
     return np.stack([np.cos(angles), np.sin(angles)], axis=1)
 
 
-def disc(mu: float, kept: float) -> Watched:
-    """The centre of a disc that is thrown on the ground, and its point that was on the right."""
+def disc(mu: float, kept: float, spin: float = THROWN[1]) -> Watched:
+    """The centre of a disc that is thrown on the ground with a spin [rad/s]."""
     data = {
         "name": "thrown-disc",
         "bodies": {"disc": {"kind": "rigid-body", "mass": 1.0, "inertia": INERTIA}},
         "contacts": {"floor": {"first": {"body": "disc", "radius": RADIUS}, "second": {"body": "ground", "line": 0.0},
                                "restitution": kept, "mu": mu}},
-        "initial": {"disc": {"position": [0.0, 0.6 + RADIUS], "velocity": [THROWN[0], 0.0], "rate": THROWN[1]}},
+        "initial": {"disc": {"position": [0.0, 0.6 + RADIUS], "velocity": [THROWN[0], 0.0], "rate": spin}},
         "markers": {"disc": {"body": "disc"}},
     }  # fmt: skip
     times = TIMES[:20]
-    return Watched(Scene.parse(data), {}, "disc", times, bounced(mu, kept, times.tobytes()), 1.0)
+    return Watched(Scene.parse(data), {}, "disc", times, bounced(mu, kept, spin, times.tobytes()), 1.0)
 
 
 @cache
-def bounced(mu: float, kept: float, times: bytes) -> Array:
+def bounced(mu: float, kept: float, spin: float, times: bytes) -> Array:
     """Where the centre of the disc is [m], (times, 2)."""
-    return np.array([_bounced(mu, kept, float(time)) for time in np.frombuffer(times)])
+    return np.array([_bounced(mu, kept, spin, float(time)) for time in np.frombuffer(times)])
 
 
-def _bounced(mu: float, kept: float, time: float) -> Array:
-    (u, w), x, begin, rate = THROWN, 0.0, -np.sqrt(1.2 / G), np.sqrt(1.2 * G)
-    begin, flight = 0.0, np.sqrt(1.2 / G)  # the first flight begins at the top
-    height = 0.6
-    if time < flight:
-        return np.array([u * time, RADIUS + height - 0.5 * G * time * time])
-    x, begin = u * flight, flight
+def _bounced(mu: float, kept: float, spin: float, time: float) -> Array:
+    u, w, rate, begin = THROWN[0], spin, np.sqrt(1.2 * G), np.sqrt(1.2 / G)
+    if time < begin:
+        return np.array([u * time, RADIUS + 0.6 - 0.5 * G * time * time])
+    x = u * begin
     while True:
         u, w = _rubbed(u, w, mu * (1.0 + kept) * rate)
         rate *= kept
@@ -146,7 +144,7 @@ MAPS = (
     ),
     _map(
         "friction", "How much friction, with which restitution?",
-        "A disc with backspin that slips, rolls or turns round by its impacts. MuJoCo's law of friction lifts what "
+        "A disc with spin that slips until an impact lets it roll. MuJoCo's law of friction lifts what "
         "slides; ours is Coulomb's.",
         Axis("coefficient of friction", "", (0.0, 0.05, 0.2, 0.5, 1.0)), RESTITUTION, disc, lambda x, y: step(1e-3),
     ),

@@ -26,6 +26,8 @@ _SWINGS = 3
 _FACTOR, _ELSEWHERE, _DESCENTS, _DIPS = 5.0, 31, 6, 3
 """Positive quantities are tried within this factor, others all over their bounds, at so many points; the best of them
 are followed, first so many of those that are lower than their neighbours."""
+_SAME = 1e-9
+"""Relative change of the squares that is none: of motions that differ by round-off."""
 _LINE, _WIDTH, _LOOKED_AT = 41, 0.05, 2
 """Points of the line on which false minima are sought, its half by the box, and the dips that are followed."""
 
@@ -112,7 +114,8 @@ def _others(model: ForwardModel, point: Array, free: npt.NDArray[np.intp]) -> tu
     """Other values of these parameters within the bounds, and those among them where the fitness dips, the best first.
 
     Each is varied alone and all together, by factors or, the nearer to the point the closer, from bound to bound; where
-    bounds are far away beside a value, between multiples of it, too.
+    bounds are far away beside a value, between multiples of it, too. Before these dips are the edges of what changes
+    nothing all along its line.
     """
     logarithmic = model.parameters.logarithmic
     reach = np.minimum(np.log(_FACTOR), (model.upper - model.lower) / 2)
@@ -136,7 +139,23 @@ def _others(model: ForwardModel, point: Array, free: npt.NDArray[np.intp]) -> tu
     along = np.pad(values[: len(lines) * _ELSEWHERE].reshape(-1, _ELSEWHERE), ((0, 0), (1, 1)), constant_values=np.inf)
     lower = (along[:, 1:-1] < along[:, :-2]) & (along[:, 1:-1] < along[:, 2:])
     dips = np.flatnonzero(lower)
-    return points[np.argsort(values, kind="stable")], points[dips[np.argsort(values[dips], kind="stable")]]
+    unseen = [k for k, row in zip(free, along[:, 1:-1], strict=False) if np.ptp(row) <= _SAME * np.max(row)]
+    edges = [_edges(model, point, k) for k in unseen]
+    return points[np.argsort(values, kind="stable")], np.concatenate(
+        [*edges, points[dips[np.argsort(values[dips], kind="stable")]]]
+    )
+
+
+def _edges(model: ForwardModel, point: Array, parameter: int) -> Array:
+    """Values of a parameter, evenly from bound to bound, at which the data begin to depend on it; none if nowhere.
+
+    Friction of a contact that sticks changes nothing: no descent leaves there, and just beyond it the fit may be worse.
+    """
+    points = np.tile(point, (_ELSEWHERE, 1))
+    points[:, parameter] = np.linspace(model.lower[parameter], model.upper[parameter], _ELSEWHERE)
+    values, here = np.split(model.fitness(np.concatenate([points, point[None]])), [_ELSEWHERE])
+    same = np.pad(np.abs(values - here) <= _SAME * here, 1)
+    return points[~same[1:-1] & (same[:-2] | same[2:])]
 
 
 def _wide(model: ForwardModel, point: Array) -> npt.NDArray[np.bool_]:
