@@ -230,6 +230,18 @@ def test_jumps_of_time_and_of_the_state_meet() -> None:
     assert found.points[:, 0, 0, 0] == pytest.approx([0.0, 0.5], abs=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("scale", "place"), [("step(slide(rail))", 0.5), ("sign(slide(rail))", 0.0), ("-step(-slide(rail))", -0.5)]
+)
+def test_a_switch_at_zero_at_the_start_is_above(scale: str, place: float) -> None:
+    """As step(0) is 1 and sign(0) is 0."""
+    data = on_rail(1.0, 0.0, scale)
+    for integrator in ("rk4", "dop853"):
+        data["solver"] = {"integrator": integrator, "step": 1e-2, "duration": 1.0}
+        found = simulate(Scene.parse(data), np.array([1.0]))
+        assert found.points[0, 0, 0, 0] == pytest.approx(place, abs=1e-10)
+
+
 def test_lanes_that_switch_are_run_one_by_one() -> None:
     scene = Scene.parse(on_rail(1.0, 0.0, "1 - jump*step(slide(rail) - 0.1)", signals={"jump": 6.0}))
     found = simulate(scene, np.array([1.0, 2.0]), {"signals.jump": np.array([6.0, 2.0])})

@@ -239,6 +239,8 @@ def _settle(tile: Tile, s: Signals, m: Any, w: Any, t: float, z: Array, zdot: Ar
     derive(tile, m.derived, z, m.unknowns, m.force_rows, False)
     derive(tile, m.derived, zdot, m.unknowns, m.force_rows, True)
     for number in range(s.switches):
+        if not turning:  # where an argument is zero the switch is above, as step(0) is 1
+            branch[number] = 1.0
         evaluate(tile, s, m, w, t, z, zdot)
         turns = margin(tile, s, w, number) < -SMALL * largest(tile, s, w, number)
         if turns or (turning and branch[s.switches + number] > 0.0):
