@@ -22,7 +22,7 @@ def test_restitution_friction_and_gap_are_found_from_wrong_starts(name: str, see
 
 
 @pytest.mark.slow  # identifications
-@pytest.mark.parametrize("seed", [7, 13])
+@pytest.mark.parametrize("seed", [7, 8, 76])
 def test_friction_that_sticks_at_the_start_is_found_where_the_data_begin_to_depend_on_it(seed: int) -> None:
     """The starts are beyond 0.2, where the disc sticks at once and no derivative leads away."""
     found = trial("disc", seed)

@@ -115,7 +115,7 @@ def _others(model: ForwardModel, point: Array, free: npt.NDArray[np.intp]) -> tu
 
     Each is varied alone and all together, by factors or, the nearer to the point the closer, from bound to bound; where
     bounds are far away beside a value, between multiples of it, too. Before these dips are the edges of what changes
-    nothing all along its line.
+    nothing at the point.
     """
     logarithmic = model.parameters.logarithmic
     reach = np.minimum(np.log(_FACTOR), (model.upper - model.lower) / 2)
@@ -139,7 +139,8 @@ def _others(model: ForwardModel, point: Array, free: npt.NDArray[np.intp]) -> tu
     along = np.pad(values[: len(lines) * _ELSEWHERE].reshape(-1, _ELSEWHERE), ((0, 0), (1, 1)), constant_values=np.inf)
     lower = (along[:, 1:-1] < along[:, :-2]) & (along[:, 1:-1] < along[:, 2:])
     dips = np.flatnonzero(lower)
-    unseen = [k for k, row in zip(free, along[:, 1:-1], strict=False) if np.ptp(row) <= _SAME * np.max(row)]
+    near = along[:, _ELSEWHERE // 2 : _ELSEWHERE // 2 + 3]
+    unseen = [k for k, row in zip(free, near, strict=False) if np.ptp(row) <= _SAME * np.max(row)]
     edges = [_edges(model, point, k) for k in unseen]
     return points[np.argsort(values, kind="stable")], np.concatenate(
         [*edges, points[dips[np.argsort(values[dips], kind="stable")]]]
