@@ -32,15 +32,18 @@ UNCLEAR = 1e-6
 """Difference of accelerations, over what makes them up, by which forces that are not unique move a machine."""
 SHARES, RELIEF = 12, 0.5
 """Times at which contacts that depend on each other are lowered, and by how much, as one is beyond its limit."""
+FAINT = 1e-9
+"""Least scale of a force, over the largest: a smaller one is none that could be lowered."""
 ANGLES = 32
 """Directions of slip in space that are tried, between which the one is bracketed."""
 
 
 @njit(cache=True, error_model="numpy")
-def solve(n: int, matrix: Array, load: Array, out: Array) -> int:
+def solve(n: int, matrix: Array, load: Array, out: Array, null: Array) -> int:
     """Solve A x = load of consistent equations, with x = 0 where they leave it open; (n, n) in rows. Returns the rank.
 
-    Destroys both. Gauss's elimination with complete pivoting of the rows and columns scaled to 1.
+    null: vectors z with A z = 0 that span all of them, one after the other, (n * n,), or empty. Destroys both. Gauss's
+    elimination with complete pivoting of the rows and columns scaled to 1.
     """
     scale, order, rank = np.ones(n), np.arange(n), 0
     for turn in range(2):
@@ -85,6 +88,18 @@ def solve(n: int, matrix: Array, load: Array, out: Array) -> int:
         out[order[k]] = total / matrix[k * n + k]
     for i in range(n):
         out[i] *= scale[i]
+    for free in range(rank, n if len(null) > 0 else rank):
+        first = (free - rank) * n
+        for i in range(n):
+            null[first + i] = 0.0
+        null[first + order[free]] = 1.0
+        for k in range(rank - 1, -1, -1):
+            total = matrix[k * n + free]
+            for j in range(k + 1, rank):
+                total += matrix[k * n + j] * null[first + order[j]]
+            null[first + order[k]] = -total / matrix[k * n + k]
+        for i in range(n):
+            null[first + i] *= scale[i]
     return rank
 
 
@@ -119,10 +134,10 @@ def hold(
         out[row] = 0.0
         if mode[row // ways] != OPEN:
             each[n], n = row, n + 1
-    equations, right, found = np.zeros(n * n), np.zeros(n), np.zeros(n)
+    equations, right, found, null = np.zeros(n * n), np.zeros(n), np.zeros(n), np.zeros(n * n)
     _state(gaps, given, width, lane, mode, way, matrix, load, n, each, equations, right)
-    unclear = False
-    if solve(n, equations, right, found) < n:
+    unclear, free = False, n - solve(n, equations, right, found, null)
+    if free > 0:
         other, scale, share = found.copy(), np.zeros(n), np.ones(n)
         for i in range(n):
             contact, k = each[i] // ways, each[i] % ways
@@ -130,13 +145,11 @@ def hold(
             most = limit(gaps, given, contact, width, lane, normal, True) if k > 0 else normal
             scale[i] = most if most < np.inf else normal
         for _ in range(SHARES):
-            _state(gaps, given, width, lane, mode, way, matrix, load, n, each, equations, right)
-            _least(n, equations, right, scale * share, found)
+            _lower(n, free, null, scale * share, found)
             if not _relieve(gaps, given, width, lane, mode, n, each, found, share):
                 break
         else:  # there are no such forces: some slip
-            _state(gaps, given, width, lane, mode, way, matrix, load, n, each, equations, right)
-            _least(n, equations, right, scale, found)
+            _lower(n, free, null, scale, found)
         for i in range(n):
             change, whole = 0.0, 0.0
             for j in range(n):
@@ -150,26 +163,33 @@ def hold(
 
 
 @njit(cache=True, error_model="numpy")
-def _least(n: int, equations: Array, right: Array, scale: Array, out: Array) -> None:
-    """Find the least solution of equations, (n, n) in rows, each unknown over its scale. Destroys both."""
-    square, rest, multiplier = np.zeros(n * n), np.zeros(n), np.zeros(n)
+def _lower(n: int, free: int, null: Array, scale: Array, x: Array) -> None:
+    """Add to x the combination of null vectors that leaves the least of its squares, each entry over its scale.
+
+    By modified Gram-Schmidt, which orthogonalises the vectors and takes them out of x as one more (Bjorck 1967).
+    """
+    ways, whole, rest, least = np.zeros(free * n), null[: free * n].copy(), np.zeros(n), FAINT * np.max(scale)
     for i in range(n):
-        rest[i] = right[i]
-        for j in range(n):
-            for k in range(n):
-                square[i * n + j] += equations[i * n + k] * scale[k] ** 2 * equations[j * n + k]
-    solve(n, square, rest, multiplier)
-    for k in range(n):
-        out[k] = 0.0
+        weight = 1.0 / max(scale[i], least)
+        rest[i] = x[i] * weight
+        for k in range(free):
+            ways[k * n + i] = whole[k * n + i] * weight
+    for k in range(free):
+        square = 0.0
         for i in range(n):
-            out[k] += scale[k] ** 2 * equations[i * n + k] * multiplier[i]
-    # The equations are squared: what that leaves of them is taken out.
-    for i in range(n):
-        for j in range(n):
-            right[i] -= equations[i * n + j] * out[j]
-    solve(n, equations, right, rest)
-    for i in range(n):
-        out[i] += rest[i]
+            square += ways[k * n + i] ** 2
+        for other in range(k + 1, free + 1):
+            along = 0.0
+            for i in range(n):
+                along += ways[k * n + i] * (rest[i] if other == free else ways[other * n + i])
+            along /= square
+            for i in range(n):
+                if other == free:
+                    rest[i] -= along * ways[k * n + i]
+                    x[i] -= along * whole[k * n + i]
+                else:
+                    ways[other * n + i] -= along * ways[k * n + i]
+                    whole[other * n + i] -= along * whole[k * n + i]
 
 
 @njit(cache=True, error_model="numpy")
@@ -419,7 +439,7 @@ def alone(
         right[i] = -rest[first + i]
         for j in range(ways):
             block[i * ways + j] = matrix[(first + i) * n + first + j]
-    solve(ways, block, right, push)
+    solve(ways, block, right, push, np.zeros(0))
     tangential = np.sqrt(np.sum(push[1:] ** 2))
     within = push[0] >= 0.0 and tangential <= limit(gaps, given, contact, width, lane, push[0], True)
     if within and _vanish(ways, n, first, matrix, rest, push):
@@ -465,7 +485,7 @@ def _under(
             right[i] = -rest[first + i] - matrix[(first + i) * n + first] * normal
             for j in range(1, ways):
                 block[i * ways + j] = matrix[(first + i) * n + first + j]
-        solve(ways, block, right, push)
+        solve(ways, block, right, push, np.zeros(0))
         size = np.sqrt(np.sum(push[1:] ** 2))
         if size <= limit(gaps, given, contact, width, lane, max(normal, 0.0), True):
             for k in range(1, ways):

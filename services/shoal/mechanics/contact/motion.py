@@ -168,4 +168,4 @@ def _settle_rubbing(tile: Tile, m: Arrays, w: Work, lane: int, held: Array, part
                 right[row] = -g.load[row]
             else:
                 equations[row * n + row] = 1.0
-    coulomb.solve(n, equations, right, g.found)
+    coulomb.solve(n, equations, right, g.found, np.zeros(0))
