@@ -12,6 +12,7 @@ from shoal.errors import InputError
 from shoal.mechanics.analysis.modes import modes
 from shoal.mechanics.analysis.reactions import reactions
 from shoal.mechanics.simulate import simulate
+from shoal.notebook import sweep
 from shoal.scene import Scene
 
 FINE = {"solver.integrator": "dop853", "solver.relative_tolerance": 1e-10, "solver.absolute_tolerance": 1e-11}
@@ -162,3 +163,12 @@ def test_what_cannot_be_coupled_is_refused_by_its_field(coupled: Any, message: s
 def test_engines_without_rotors_refuse_them() -> None:
     with pytest.raises(InputError, match=r"joints.O.armature: engine tree cannot do armature; use gauss or mujoco"):
         get_engine("tree").simulate(pendulum(0.1))
+
+
+def test_lanes_have_rotors_of_their_own() -> None:
+    """None of them, in a batch with others, is as a scene without."""
+    values = [0.0, 0.1, 0.3]
+    scene = pendulum(0.1, 0.5)
+    swept = sweep(scene, {"joints.O.armature": values}, 0.2).positions["tip"]
+    alone = [simulate(pendulum(one, 0.5), np.array([0.2])).marker("tip")[0] for one in values]
+    assert swept == pytest.approx(np.array(alone), abs=1e-6)

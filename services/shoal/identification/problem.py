@@ -49,7 +49,7 @@ _POSITIVE = {
         "inertia",
         "youngs_modulus",
     ),
-    *("stiffness", "damping", "friction", "drag", "coulomb", "mu", "retardation", "clock", "scale"),
+    *("stiffness", "damping", "friction", "drag", "coulomb", "armature", "mu", "retardation", "clock", "scale"),
 }
 """Last names of paths to quantities that are positive, and known by their order of magnitude rather than by a sum."""
 
