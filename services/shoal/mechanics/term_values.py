@@ -80,7 +80,10 @@ class TermValues:
             by_u[:, self._roots] = np.where(length[..., None] > 0, u[:, self._roots] / safe, axis)
             by_w[:, self._roots] = 0.0
         values = np.zeros((lanes, self.count))
-        np.add.at(values.T, self._products, found.T)
+        if len({*self._products.tolist()}) == len(self._products):
+            values[:, self._products] = found
+        else:
+            np.add.at(values.T, self._products, found.T)
         by_turned = np.zeros_like(turned)
         if len(self._angled):
             x, y = turned[..., 0], turned[..., 1]
