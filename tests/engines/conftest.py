@@ -431,6 +431,19 @@ ONLY_NATIVE = [
         initial={"A": {"position": [0.0, 0.8], "velocity": [1.0, 0.0]}},
     ),
     scene(
+        "tumbling",
+        {"A": BLOCK},
+        {},
+        {"A": at("A", [0.0, 0.0])},
+        contacts={
+            "floor": {
+                "first": at("A", [0.0, 0.0]) | {"polygon": [[-0.1, -0.1], [0.1, -0.1], [0.1, 0.1], [-0.1, 0.1]]},
+                "second": GROUND | {"line": 0.0},
+            }
+        },
+        initial={"A": {"position": [0.0, 0.8], "velocity": [1.0, 0.0]}},
+    ),
+    scene(
         "hose",
         {"A": {"kind": "point-mass", "mass": 1.0}},
         {"D": joint(GROUND, at("A"), "distance", length=0.5)},

@@ -72,6 +72,11 @@ MACHINES["pin-with-play"] = machine(
     joints={"J": {"first": GROUND, "second": {"body": "A", "point": [-0.5, 0.0]}, "play": 0.03, "radius": 0.02,
                   "restitution": 0.5}},
 )  # fmt: skip
+MACHINES["block-on-line"] = machine(
+    BALL, {"position": [0.0, 0.6], "angle": 0.5, "velocity": [0.5, 0.0]}, 0.36,
+    contacts=touching({"polygon": [[-0.1, -0.1], [0.1, -0.1], [0.1, 0.1], [-0.1, 0.1]]}, {"line": 0.1},
+                      restitution=0.5),
+)  # fmt: skip
 DAILY = ("hinge", "circle-on-line")
 
 
