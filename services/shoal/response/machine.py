@@ -69,10 +69,13 @@ class ResponseModel:
         """Return the words of events until each instant as numbers, (lanes, instants), and keep their texts."""
         found = np.zeros((lanes, len(self.times)))
         for lane, letters in enumerate(motion.words):
-            for k, until in enumerate(self.times.tolist() if letters else ()):
-                text = word(letters, until)
-                number = float(int.from_bytes(hashlib.blake2b(text.encode(), digest_size=6).digest())) if text else 0.0
-                self.texts[number], found[lane, k] = text, number
+            # A word changes at events only.
+            edges = np.unique([time for time, _ in letters])
+            last = np.searchsorted(edges, self.times, side="right")
+            for k in np.unique(last[last > 0]):
+                text = word(letters, float(edges[k - 1]))
+                number = float(int.from_bytes(hashlib.blake2b(text.encode(), digest_size=6).digest()))
+                self.texts[number], found[lane, last == k] = text, number
         return found
 
     @property

@@ -47,7 +47,7 @@ class CachedModel:
 
     most: runs that it may make; progress: called after every call with their number; controls: runs all over the box
     that test a surrogate; named: runs at the arguments of its extremes, which attain the bounds; aside: runs that were
-    set aside
+    set aside; looked: those of them that looked for different events
     """
 
     model: Model
@@ -63,6 +63,7 @@ class CachedModel:
     controls: int = 0
     named: int = 0
     aside: int = 0
+    looked: int = 0
 
     def __call__(self, xi: Array) -> int:
         """Make the runs at these places that have not been made; how many they are.
@@ -132,8 +133,8 @@ class CachedModel:
 
     @property
     def own(self) -> int:
-        """Runs made but for those of control and those at the extremes of a surrogate of cycles."""
-        return self.evaluations - self.controls - self.named
+        """Runs made but for those of control, at the extremes of a surrogate of cycles, and that looked for events."""
+        return self.evaluations - self.controls - self.named - self.looked
 
     @property
     def failed(self) -> int:

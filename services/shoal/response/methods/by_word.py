@@ -42,13 +42,17 @@ APART, SPARSE = 0.02, 64
 
 
 def differ(study: Study) -> bool:
-    """Return whether runs all over the box have different words of events, after they are made."""
+    """Return whether runs all over the box have different words of events; they are made, and set aside if not."""
     count = FIRST * (1 + len(study.inputs))
     ends = corners(len(study.inputs)) if len(study.inputs) <= MOST_CORNERS else np.zeros((1, len(study.inputs)))
     unit = np.eye(len(study.inputs))
     study.runs(np.vstack([0.0 * unit[:1], unit, -unit, ends, study.inputs.sobol(count, study.seed)]))
     words = study.runs.words
-    return words is not None and bool(np.any(words != words[:1]))
+    if words is not None and np.any(words != words[:1]):
+        return True
+    study.runs.set_aside()
+    study.runs.looked = study.runs.aside
+    return False
 
 
 def by_word(study: Study) -> Found:

@@ -92,8 +92,10 @@ def watched(study: Study, xi: Array, times: Array) -> Array:
     every = np.union1d(times, instants)
     answers = study.over_time(every)(study.inputs.values(xi))
     whole = answers.values.reshape(len(xi), len(every), -1)
-    columns = whole[:, np.searchsorted(every, instants)].reshape(len(xi), -1)
-    study.runs.keep(xi, replace(answers, values=columns))
+    asked = np.searchsorted(every, instants)
+    columns = whole[:, asked].reshape(len(xi), -1)
+    words = None if answers.words is None else answers.words[:, asked]
+    study.runs.keep(xi, replace(answers, values=columns, words=words))
     if not answers.good.all():
         raise UnsuitableError(f"{len(xi) - int(answers.good.sum())} of the longer runs failed: {answers.why}")
     return np.asarray(whole[:, np.searchsorted(every, times)])
