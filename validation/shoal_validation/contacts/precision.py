@@ -31,7 +31,7 @@ STEPS = (300, 1000, 3000, 10_000, 30_000, 100_000, 300_000, 1_000_000)
 STIFF = (0.25, 1.0, 4.0)
 """Steps that the springs are made for, over the step taken: stiffness ~ 1 / square."""
 NEIGHBOURS = (1.0, 1.05, 1.11)
-LONGEST = 1.2
+LONGEST = 3.0
 """No finer steps after a run as long as that [s]."""
 REPEATS = 9
 ERRORS = (1e-2, 3e-3, 1e-3, 1e-4, 1e-6)
