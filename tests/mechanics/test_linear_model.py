@@ -233,6 +233,30 @@ def test_a_governor_in_steady_rotation_has_the_frequency_of_its_closed_form() ->
     np.testing.assert_allclose(found.b[2:, 0], [1.0 / (shaft + inertia * np.sin(angle) ** 2), 0.0], atol=1e-8)
 
 
+def test_states_of_the_user_are_states() -> None:
+    """A motor with an inductance, a gear and viscous friction turns a disc: the textbook's third order."""
+    resistance, inductance, constant, gear, inertia, friction = 0.8, 2e-3, 0.06, 20.0, 0.046, 0.05
+    disc = {"kind": "rigid-body", "mass": 1.0, "inertia": inertia}
+    pin = {"first": {"body": "ground", "point": [0.0, 0.0]}, "second": {"body": "disc"}}
+    scene = Scene.parse({
+        "name": "motor", "bodies": {"disc": disc}, "joints": {"axle": pin}, "signals": {"u": 0.0},
+        "states": {"i": {"rate": f"(u - {resistance}*i - {gear * constant}*rate(axle))/{inductance}", "size": 10.0}},
+        "loads": {"motor": {"kind": "torque", "at": {"body": "disc"},
+                            "torque": f"{gear * constant}*i - {friction}*rate(axle)"}},
+        "markers": {"rim": {"body": "disc"}},
+    })  # fmt: skip
+    found = linearize(scene, ["u"], ["rate(axle)", "i"], about="start")
+    assert found.states == ("angle(axle)", "rate(axle)", "i")
+    by = gear * constant
+    np.testing.assert_allclose(
+        found.a,
+        [[0, 1, 0], [0, -friction / inertia, by / inertia], [0, -by / inductance, -resistance / inductance]],
+        rtol=1e-8, atol=1e-7,
+    )  # fmt: skip
+    np.testing.assert_allclose(found.b[:, 0], [0, 0, 1 / inductance], rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(found.c, [[0, 1, 0], [0, 0, 1]], atol=1e-9)
+
+
 def test_the_command_writes_the_matrices_for_other_tools(tmp_path: Any) -> None:
     import yaml
     from click.testing import CliRunner

@@ -24,7 +24,7 @@ from shoal.findings import Concluded, Finding
 from shoal.mechanics import plane
 from shoal.mechanics.analysis import left_out
 from shoal.mechanics.analysis import modes_findings as kinds
-from shoal.mechanics.analysis.at_rest import at_start
+from shoal.mechanics.analysis.at_rest import begun
 from shoal.mechanics.analysis.balance import BALANCED, Balance
 from shoal.mechanics.analysis.damped import AT_MOST, Roots, small
 from shoal.mechanics.analysis.evaluate import Evaluator, Probe
@@ -34,13 +34,14 @@ from shoal.mechanics.analysis.modes_findings import ModesStatus, status_of
 from shoal.mechanics.analysis.moving_slopes import Probed, slopes
 from shoal.mechanics.analysis.small_motions import BoundedMatrix
 from shoal.mechanics.analysis.statics import seek
+from shoal.mechanics.assembly.masses import STATE
 from shoal.mechanics.machine import Machine
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
 from shoal.mechanics.simulate import simulate
 from shoal.scene import DistributedForce, Force, PointMass, Scene, SignalFunction, Torque
 from shoal.scene.formula import Measure, Node
-from shoal.scene.signals import SLIDING, TURNING, Constant, Table, check_leaves, is_of_time, written_out
+from shoal.scene.signals import SLIDING, TURNING, Constant, StateValue, Table, check_leaves, is_of_time, written_out
 
 Complex = npt.NDArray[np.complex128]
 ABOUT = ("equilibrium", "start", "trajectory")
@@ -178,11 +179,11 @@ def linearize(
     """
     one_of("about", about, ABOUT)
     check(time=time)
-    if scene.states:
-        raise InputError(f"states.{next(iter(scene.states))}: linear models know no states yet")
     opened, signals = _open(scene, inputs, time)
     places = [*_places(opened)]
-    asked = (*places, *(Measure(RATES[one.kind], one.names) for one in places), *(_formula(opened, o) for o in outputs))
+    users = tuple(StateValue(name) for name in scene.states)
+    rates = (Measure(RATES[one.kind], one.names) for one in places)
+    asked = (*places, *rates, *users, *(_formula(opened, output) for output in outputs))
     evaluator = Evaluator(Machine.of(opened).probed(asked, time), one_sided=True, signals=True)
     state = _state_of(scene, about, time)
     for pose in state.way:
@@ -192,14 +193,18 @@ def linearize(
         state.remarks.append(kinds.ON_A_KINK.found("a signal is where its derivative jumps: that on one side is taken"))
     chosen, to = _states(probe.by_place[:count] @ state.modes)
     names = [str(places[k]) for k in chosen] or [f"mode {k + 1}" for k in range(len(to))]
-    rates = [str(asked[count + k]) for k in chosen] or [f"rate of {name}" for name in names]
-    own = list(range(2 * count, len(asked))) if outputs else chosen
+    speeds = [str(asked[count + k]) for k in chosen] or [f"rate of {name}" for name in names]
+    kept = list(range(2 * count, 2 * count + len(users)))
+    own = list(range(2 * count + len(users), len(asked))) if outputs else chosen
     if state.balance is not None:
         a, c, poles = _at_rest(state.balance, state, probe, to, own)
         error = float(np.finfo(float).eps * np.linalg.cond(to)) if len(to) else 0.0
     elif len(chosen) == len(to):
-        probed = Probed(chosen, [count + k for k in chosen], own)
-        found = slopes(evaluator, state.q, state.v, time, probed, span(scene))
+        probed, sizes = (
+            Probed(chosen, [*(count + k for k in chosen), *kept], own),
+            [one.size for one in scene.states.values()],
+        )
+        found = slopes(evaluator, state.q, state.v, time, probed, span(scene), sizes)
         a, c, error, poles = found.a, found.c, found.error, None
         state.remarks.append(
             kinds.BY_DIFFERENCES.found(f"by differences, known to {found.error:.1g}", error=found.error)
@@ -208,16 +213,17 @@ def linearize(
         raise InputError("about: no angles and places of joints, bodies and markers describe this motion; add markers")
     # An input that acts on nothing is no constant of the model.
     acting = np.array([[name == one for one in signals] for name in evaluator.model.signal_names], dtype=float)
-    acting, n = acting.reshape(-1, len(signals)), len(to)
-    a = np.vstack([np.eye(2 * n)[n:], a])
+    acting, n, m = acting.reshape(-1, len(signals)), len(to), len(users)
+    a = np.vstack([np.eye(2 * n + m)[n : 2 * n], a])
+    massless = probe.by_rate[kept] @ (probe.force / evaluator.mass.diagonal()[:, None])
     return LinearModel(
         scene=scene,
         about=about,
         a=a,
-        b=np.vstack([np.zeros((n, len(signals))), to @ (state.modes.T @ probe.force @ acting)]),
+        b=np.vstack([np.zeros((n, len(signals))), to @ (state.modes.T @ probe.force @ acting), massless @ acting]),
         c=c,
         d=probe.by_constants[own] @ acting,
-        states=(*names, *rates),
+        states=(*names, *speeds, *scene.states),
         inputs=tuple(inputs),
         outputs=tuple(outputs) or tuple(names),
         at=probe.value[own],
@@ -255,8 +261,8 @@ def _state_of(scene: Scene, about: str, time: float) -> _State:
         return _resting(
             balance, equilibrium.q, [*doubts, *(one for one in remarks if one.text not in equilibrium.message)]
         )
-    evaluator = at_start(scene, horizon=time)
-    if about == "start" and not is_moving(evaluator, time):
+    evaluator = Evaluator(begun(Machine.of(scene).model(time)), one_sided=True, signals=True)
+    if about == "start" and not scene.states and not is_moving(evaluator, time):
         balance = Balance(evaluator, time, span(scene), sum(float(body.mass) for body in scene.bodies.values()))
         q, gap = balance.restore(evaluator.model.q0[:, 0].copy())
         if gap > CLOSED:
@@ -277,8 +283,13 @@ def _state_of(scene: Scene, about: str, time: float) -> _State:
             raise ComputationError(f"{scene.name}: the motion to linearize about fails: {run.message}")
         way = run.states.q[..., 0]
         q, v = way[-1], run.states.v[-1, :, 0]
-    freedom = Metric(evaluator.mass).freedom(evaluator.at(q, v, time).jacobian)
-    return _State(q, v, freedom.basis, way, None, remarks)
+    # Unknowns whose rates are states of the user have no mass, and no place.
+    own = np.flatnonzero(evaluator.mass.diagonal() > STATE)
+    jacobian = evaluator.at(q, v, time).jacobian
+    basis = Metric(evaluator.mass[own][:, own]).freedom(jacobian[:, own]).basis
+    modes = np.zeros((len(q), basis.shape[1]))
+    modes[own] = basis
+    return _State(q, v, modes, way, None, remarks)
 
 
 def _resting(balance: Balance, q: Array, remarks: list[Finding]) -> _State:

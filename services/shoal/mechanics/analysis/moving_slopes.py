@@ -1,12 +1,13 @@
 """Linear models about a state that moves or is not in balance, in coordinates of the user's kind.
 
-Of places p of the machine that describe all its directions, and their rates r, p' = r and r' = f(p, r, t) follow from
-the constraints and Gauss's principle at any state. A and C are differences of fourth order of f and of the outputs by p
-and r, with half the step to tell their error.
+Of places p of the machine that describe all its directions, and their rates and the states of the user r, r' = f(p, r,
+t) follows from the constraints and Gauss's principle at any state. A and C are differences of fourth order of f and of
+the outputs by p and r, with half the step to tell their error.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -24,7 +25,7 @@ MOST = 30
 
 
 class Probed(NamedTuple):
-    """Numbers of the probes of a model that are places, their rates, and outputs."""
+    """Numbers of the probes of a model that are places, their rates and then states of the user, and outputs."""
 
     places: list[int]
     rates: list[int]
@@ -32,7 +33,7 @@ class Probed(NamedTuple):
 
 
 class Slopes(NamedTuple):
-    """Derivatives of r' and of the outputs by p and r, (places, 2 places) and (outputs, 2 places).
+    """Derivatives of r' and of the outputs by p and r, (rates, places + rates) and (outputs, places + rates).
 
     error: of differences, over the largest derivative of each.
     """
@@ -42,15 +43,20 @@ class Slopes(NamedTuple):
     error: float
 
 
-def slopes(evaluator: Evaluator, q: Array, v: Array, t: float, probed: Probed, size: float) -> Slopes:
-    """Return derivatives at a state q, v at time t [s]. size: of the machine, for places that are lengths [m].
+def slopes(
+    evaluator: Evaluator, q: Array, v: Array, t: float, probed: Probed, size: float, sizes: Sequence[float] = ()
+) -> Slopes:
+    """Return derivatives at a state q, v at time t [s].
+
+    size: of the machine, for places that are lengths [m]; sizes: of the states of the user.
 
     Raises ComputationError where the places do not lead to a state of the machine.
     """
-    n, begun = len(probed.places), _values(evaluator, q, v, t)
+    n, m, begun = len(probed.places), len(probed.rates), _values(evaluator, q, v, t)
     base = np.concatenate([begun[probed.places], begun[probed.rates]])
-    fast = max(float(np.max(np.abs(base[n:]), initial=0.0)), 1.0)
-    steps = STEP * np.append(np.full(n, min(size, 1.0)), np.full(n, fast))
+    fast = max(float(np.max(np.abs(base[n : 2 * n]), initial=0.0)), 1.0)
+    own = np.maximum(np.abs(base[2 * n :]), sizes)
+    steps = STEP * np.concatenate([np.full(n, min(size, 1.0)), np.full(n, fast), own])
 
     def at(state: Array) -> Array:
         return _right_side(evaluator, *_reached(evaluator, q, v, state, t, probed), t, probed)
@@ -58,14 +64,14 @@ def slopes(evaluator: Evaluator, q: Array, v: Array, t: float, probed: Probed, s
     def by(share: float) -> Array:
         columns = []
         for k, h in enumerate(share * steps):
-            unit = np.eye(2 * n)[k]
+            unit = np.eye(n + m)[k]
             near, far = (at(base + way * h * unit) - at(base - way * h * unit) for way in (1.0, 2.0))
             columns.append((8.0 * near - far) / (12.0 * h))
         return np.stack(columns, axis=1)
 
     whole, half = by(1.0), by(0.5)
     scale = max(float(np.max(np.abs(half))), 1e-300)
-    return Slopes(half[:n], half[n:], float(np.max(np.abs(half - whole))) / scale)
+    return Slopes(half[:m], half[m:], float(np.max(np.abs(half - whole))) / scale)
 
 
 def _values(evaluator: Evaluator, q: Array, v: Array, t: float) -> Array:
@@ -88,8 +94,11 @@ def _reached(evaluator: Evaluator, q: Array, v: Array, state: Array, t: float, p
             f"{evaluator.model.scene.name}: no state of the machine beside the one to linearize about"
         )
     seen, probe = evaluator.at(q, t=t), evaluator.probe(q, t=t)
-    rows = np.vstack([seen.jacobian.toarray(), probe.by_place[probed.places]])
-    left = np.append(-seen.rate - seen.jacobian @ v, state[n:] - probe.by_place[probed.places] @ v)
+    slope = probe.by_rate[probed.rates]
+    rows, left = (
+        np.vstack([seen.jacobian.toarray(), slope]),
+        np.append(-seen.rate - seen.jacobian @ v, state[n:] - slope @ v),
+    )
     return q, v + np.linalg.lstsq(rows, left, rcond=1e-12)[0]
 
 
