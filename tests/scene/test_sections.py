@@ -122,7 +122,10 @@ def test_a_rigid_tube_has_its_mass_and_its_inertia_about_its_axis() -> None:
         ({"height": 0.02, "section": "round", "end_width": 0.01}, "end_width: section round has no width"),
         ({"height": 0.02, "section": "i-beam", "width": 0.01, "web": 0.001, "flange": 0.01}, "leave nothing"),
         ({"height": 0.02, "section": "i-beam", "width": 0.01, "web": 0.02, "flange": 0.001}, "thicker than the width"),
-        ({"height": 0.02, "section": "pipe"}, "section: Input should be 'rectangle', 'round', 'tube' or 'i-beam'"),
+        (
+            {"height": 0.02, "section": "pipe"},
+            "section: Input should be 'rectangle', 'round', 'tube', 'i-beam' or 'numbers'",
+        ),
     ],
 )
 def test_what_no_section_can_be_is_one_line(fields: dict[str, Any], told: str) -> None:

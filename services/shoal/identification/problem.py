@@ -49,6 +49,7 @@ _POSITIVE = {
         "inertia",
         "youngs_modulus",
     ),
+    *("rho_A", "rho_I", "rho_I_side", "EA", "EI", "EI_side", "GJ", "GA"),
     *("stiffness", "damping", "friction", "drag", "coulomb", "armature", "mu", "retardation", "clock", "scale"),
 }
 """Last names of paths to quantities that are positive, and known by their order of magnitude rather than by a sum."""

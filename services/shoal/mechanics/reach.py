@@ -91,9 +91,8 @@ def stretch(scene: Scene, energy: Array) -> Array:
     total = np.zeros(np.shape(energy))
     for rod in scene.bodies.values():
         if isinstance(rod, Rod) and rod.element != "rigid":
-            assert rod.youngs_modulus is not None
             # The thinnest section bounds the stiffness of a tapered rod.
-            strain = np.sqrt(2 * energy / (rod.youngs_modulus * rod.thinnest.area * rod.length))
+            strain = np.sqrt(2 * energy / (rod.modulus * rod.thinnest.area * rod.length))
             total = total + rod.length * np.minimum(strain, BREAKS)
     return total
 

@@ -12,14 +12,14 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from shoal.scene.record import NonNegative, Positive, Record, Vector
-from shoal.scene.sections import SECTIONS, Section
+from shoal.scene.sections import SECTIONS, Rectangle, Section, Weighted
 from shoal.scene.solids import ModalBody, PointMass, RigidBody
 
 Element = Literal["rigid", "ancf-cable", "ancf-quintic", "ancf-full", "simo-reissner", "director-rod", "modal"]
 Quadrature = Literal["full", "reduced"]
 Law = Literal["plane-stress", "lame", "enhanced", "two-point"]
 End = Literal["pinned", "clamped", "free"]
-SectionName = Literal["rectangle", "round", "tube", "i-beam"]
+SectionName = Literal["rectangle", "round", "tube", "i-beam", "numbers"]
 
 FRAMED = ("rigid", "modal")
 """Elements of a rod that moves with a frame: no element limits its step, and no section of it has a strain."""
@@ -43,8 +43,18 @@ _ONLY_FLEXIBLE = {
     "axial_modes": 0,
     "ends": None,
     "retardation": 0.0,
+    **dict.fromkeys(("EA", "EI", "EI_side", "GJ", "GA")),
 }
 """Fields of flexible rods alone, with their default values."""
+_SHAPED = ("width", "wall", "web", "flange", "end_height", "end_width", "density", "youngs_modulus", "torsion_constant")
+"""Fields of rods whose section has a shape and one material."""
+_NUMBERS = {
+    **{"rho_A": "kg/m", "rho_I": "kg m", "rho_I_side": "kg m"},
+    **{"EA": "N", "EI": "N m^2", "EI_side": "N m^2", "GJ": "N m^2", "GA": "N"},
+}
+"""Fields of rods whose section is stated by numbers, with their units."""
+_POISSON = 0.3
+"""Poisson's ratio by default: that of steel."""
 
 
 @cache
@@ -66,18 +76,34 @@ class Rod(Record):
     width: Positive | None = None
     """Thickness along the local z axis [m]; for sections `rectangle` and `i-beam`."""
     section: SectionName = "rectangle"
-    """Shape of the section."""
+    """Shape of the section; `numbers` for stiffnesses and masses per length, of composite or measured rods."""
     wall: Positive | None = None
     """Thickness of the wall of a tube [m]."""
     web: Positive | None = None
     """Thickness of the web of an I-beam [m]."""
     flange: Positive | None = None
     """Thickness of the flanges of an I-beam [m]."""
-    density: Positive
-    """Mass density [kg/m^3]."""
+    density: Positive | None = None
+    """Mass density [kg/m^3]; of every section but `numbers`."""
     youngs_modulus: Positive | None = None
     """Young's modulus of a flexible rod [Pa]."""
-    poisson_ratio: Annotated[float, Field(gt=-1, le=0.5)] = 0.3
+    rho_A: Positive | None = None
+    """Mass per length [kg/m], of section `numbers`."""
+    rho_I: Positive | None = None
+    """Rotary inertia per length about z, for bending in the plane of motion [kg m]."""
+    rho_I_side: Positive | None = None
+    """Rotary inertia per length about y, for bending out of that plane [kg m]; by default as `rho_I`."""
+    EA: Positive | None = None
+    """Axial stiffness [N]."""
+    EI: Positive | None = None
+    """Bending stiffness in the plane of motion [N m^2]."""
+    EI_side: Positive | None = None
+    """Bending stiffness out of that plane [N m^2]; by default as `EI`."""
+    GJ: Positive | None = None
+    """Torsional stiffness [N m^2]."""
+    GA: Positive | None = None
+    """Shear stiffness, with its coefficient: shear force over shear angle [N]."""
+    poisson_ratio: Annotated[float, Field(gt=-1, le=0.5)] = _POISSON
     """Poisson's ratio [1]."""
     element: Element = "rigid"
     """Model of the rod: rigid; `ancf-cable` (cubic, Bernoulli-Euler) or `ancf-quintic` (the same of higher order);
@@ -171,7 +197,9 @@ class Rod(Record):
 
     @model_validator(mode="after")
     def _section_is_defined(self) -> Rod:
-        needs = SECTIONS[self.section].needs
+        if fault := self._number_fault():
+            raise ValueError(fault)
+        needs = () if self.section == "numbers" else SECTIONS[self.section].needs
         for field in ("width", "wall", "web", "flange"):
             if (getattr(self, field) is None) == (field in needs):
                 raise ValueError(
@@ -188,13 +216,41 @@ class Rod(Record):
                 raise ValueError(fault)
         return self
 
+    def _number_fault(self) -> str:
+        """Return which field of its section is missing or superfluous; empty if none is."""
+        if self.section != "numbers":
+            if found := [name for name in _NUMBERS if getattr(self, name) is not None]:
+                return (
+                    f"{found[0]}: section {self.section} has a shape and a density instead; it is for section: numbers"
+                )
+            return "density is missing (kg/m^3)" if self.density is None else ""
+        if self.element == "ancf-full":
+            return "section: ancf-full needs a rectangle, whose stretch numbers do not define; use simo-reissner"
+        ignored = [name for name in _SHAPED if getattr(self, name) is not None]
+        ignored += ["poisson_ratio"] if self.poisson_ratio != _POISSON else []
+        if ignored:
+            return f"{ignored[0]}: section numbers has none; state {', '.join(_NUMBERS)}"
+        if missing := self.lacking(self.element):
+            return (
+                f"{missing[0]} is missing; element {self.element} of section numbers needs it ({_NUMBERS[missing[0]]})"
+            )
+        return ""
+
+    def lacking(self, element: str) -> list[str]:
+        """Return which numbers of its section are missing for an element; none for a section with a shape."""
+        needs = ["rho_A"] if element == "rigid" else ["rho_A", "EA", "EI"]
+        needs += {"simo-reissner": ["GA"], "director-rod": ["GJ"]}.get(element, [])
+        if self.rotary_inertia or element in ("simo-reissner", "director-rod"):
+            needs.append("rho_I")
+        return [name for name in needs if self.section == "numbers" and getattr(self, name) is None]
+
     @model_validator(mode="after")
     def _slender_and_complete(self) -> Rod:
         if self.height > self.length:
             raise ValueError(f"height {self.height:g} m is larger than the length {self.length:g} m; a rod is slender")
         if self.width is not None and self.width > self.length:
             raise ValueError(f"width {self.width:g} m is larger than the length {self.length:g} m; a rod is slender")
-        if self.element != "rigid" and self.youngs_modulus is None:
+        if self.element != "rigid" and self.section != "numbers" and self.youngs_modulus is None:
             raise ValueError(f"youngs_modulus is missing; element {self.element} needs it (Pa)")
         if self.element == "modal" and self.curvature:
             raise ValueError("curvature: a modal rod is straight; use ancf-cable, ancf-quintic or simo-reissner")
@@ -263,8 +319,34 @@ class Rod(Record):
         """Return whether the section changes along the rod."""
         return self.end_height is not None or self.end_width is not None
 
+    @property
+    def modulus(self) -> Any:
+        """Young's modulus of `section_at` [Pa]: 1 for a section by numbers, whose area is EA; None if unknown."""
+        return self.youngs_modulus if self.section != "numbers" else None if self.lacking("modal") else 1.0
+
+    @property
+    def mass_field(self) -> str:
+        """Return the field to which its mass is proportional."""
+        return "rho_A" if self.section == "numbers" else "density"
+
+    @property
+    def bending_fields(self) -> tuple[str, ...]:
+        """Return the fields to which its bending stiffness is proportional."""
+        if self.section != "numbers":
+            return ("youngs_modulus",)
+        return ("EI",) if self.EI_side is None else ("EI", "EI_side")
+
+    def masses_at(self, x: Any) -> tuple[Any, Section]:
+        """The density [kg/m^3] and the section at the fraction x of the length: 1 and rho A for one by numbers."""
+        if self.section != "numbers":
+            return self.density, self.section_at(x)
+        assert self.rho_A is not None
+        height, line = self.height, self.rho_A
+        across = line * height**2 / 12 if self.rho_I is None else self.rho_I
+        return 1.0, Weighted(height, height, line, across, across if self.rho_I_side is None else self.rho_I_side)
+
     def section_at(self, x: Any) -> Section:
-        """The section at the fraction x of the length."""
+        """The section at the fraction x of the length, as it resists: weighted by the modulus if by numbers."""
         return self._section_by(lambda here, there: here + (there - here) * x)
 
     @property
@@ -274,11 +356,22 @@ class Rod(Record):
 
     def _section_by(self, tapered: Callable[[Any, Any], Any]) -> Section:
         """The section whose height and width follow from those at both ends, where these differ."""
+        if self.section == "numbers":
+            return self._weighted()
         height, width = (
             here if here is None or there is None else tapered(here, there)
             for here, there in ((self.height, self.end_height), (self.width, self.end_width))
         )
         return SECTIONS[self.section].of(height, width, self.wall, self.web, self.flange)
+
+    def _weighted(self) -> Weighted:
+        """The section by its stiffnesses; without GA as much shear as a homogeneous square has."""
+        nu, height = self.poisson_ratio, self.height
+        over = 2 * (1 + nu)  # E/G, by which elements divide
+        shear = Rectangle(height, height).shear(nu) if self.GA is None or self.EA is None else self.GA * over / self.EA
+        twist = None if self.GJ is None else self.GJ * over
+        side = self.EI if self.EI_side is None else self.EI_side
+        return Weighted(height, height, self.EA, self.EI, side, twist, shear)
 
     @property
     def mass(self) -> float:
@@ -296,7 +389,7 @@ class Rod(Record):
     @property
     def section_inertia(self) -> tuple[float, float]:
         """The integrals of y^2 and of z^2 over the mass of all sections [kg m^2], y along their height."""
-        parts = [(m / s.area, s) for (m, _), s in zip(self._pieces(), self._sections(), strict=True)]
+        parts = [(m / s.area, s) for (m, _), (_, s) in zip(self._pieces(), self._sections(), strict=True)]
         return sum(part * s.bending for part, s in parts), sum(part * s.side for part, s in parts)
 
     @property
@@ -308,13 +401,13 @@ class Rod(Record):
     def _pieces(self) -> list[tuple[Any, Any]]:
         """Masses [kg] at places x + iy [m] that have the rod's mass, centre and inertia (Gauss's quadrature)."""
         pieces = []
-        for (x, weight), section in zip(self._rule(), self._sections(), strict=True):
-            pieces.append((self.density * section.area * self.length * weight, self.axis(x * self.length)))
+        for (x, weight), (density, section) in zip(self._rule(), self._sections(), strict=True):
+            pieces.append((density * section.area * self.length * weight, self.axis(x * self.length)))
         return pieces
 
-    def _sections(self) -> list[Section]:
-        """The sections of the pieces."""
-        return [self.section_at(x) for x, _ in self._rule()]
+    def _sections(self) -> list[tuple[Any, Section]]:
+        """The densities and sections of the pieces."""
+        return [self.masses_at(x) for x, _ in self._rule()]
 
     def _rule(self) -> tuple[tuple[float, float], ...]:
         """Nodes as fractions of the length, and weights."""
@@ -333,15 +426,13 @@ class Rod(Record):
     @property
     def axial_stiffness(self) -> float:
         """EA [N] at the start."""
-        assert self.youngs_modulus is not None
-        stiffness: float = self.youngs_modulus * self.section_at(0.0).area
+        stiffness: float = self.modulus * self.section_at(0.0).area
         return stiffness
 
     @property
     def bending_stiffness(self) -> float:
         """EI [N m^2] at the start, bending in the plane of motion."""
-        assert self.youngs_modulus is not None
-        stiffness: float = self.youngs_modulus * self.section_at(0.0).bending
+        stiffness: float = self.modulus * self.section_at(0.0).bending
         return stiffness
 
     @property

@@ -49,14 +49,17 @@ def check_dimensions(scene: Any) -> None:
             raise ValueError(f"bodies.{name}.kind: modal-body is a body of the plane; say dimensions: 2")
         if body.kind == "rod" and body.element in PLANAR_ELEMENTS:
             raise ValueError(f"bodies.{name}.element: {body.element} is for the plane; use ancf-cable or director-rod")
+        if body.kind == "rod" and body.element == "rigid" and body.section == "numbers" and body.rho_I is None:
+            raise ValueError(f"bodies.{name}.rho_I is missing; in space a rigid rod of section numbers needs it (kg m)")
         if body.kind == "rod" and body.element == "director-rod":
             continue
         flexible = body.kind == "rod" and body.element != "rigid"
         alike = flexible and all(np.isclose(s.bending, s.side, rtol=1e-12) for s in map(body.section_at, (0.0, 1.0)))
         if flexible and not flat and not alike:
+            field, other = ("EI_side", "EI") if body.section == "numbers" else ("width", "height")
             raise ValueError(
-                f"bodies.{name}.width: {body.element} bends alike about both axes of its section; beyond the plane "
-                "z = 0 its width must be its height, or its element a director-rod"
+                f"bodies.{name}.{field}: {body.element} bends alike about both axes of its section; beyond the plane "
+                f"z = 0 its {field} must be its {other}, or its element a director-rod"
             )
         for field in ("curvature", "side_curvature"):
             if body.kind == "rod" and getattr(body, field):

@@ -220,5 +220,44 @@ class IBeam(Section):
         return 10 * (1 + poisson) * (1 + 3 * m) ** 2 / (bending + flanges)
 
 
+@dataclass(frozen=True)
+class Weighted(Section):
+    """A section known by its stiffnesses or masses per length: area and moments weighted by a modulus or a density,
+    of which the reference value is 1 (transformed section).
+
+    torque: the torsion constant, weighted alike; coefficient: of shear
+    """
+
+    line: Number
+    across: Number
+    sideways: Number
+    torque: Number = None
+    coefficient: Number = None
+
+    @property
+    def area(self) -> Number:
+        """EA [N] or rho A [kg/m]."""
+        return self.line
+
+    @property
+    def bending(self) -> Number:
+        """EI [N m^2] or rho I [kg m]."""
+        return self.across
+
+    @property
+    def side(self) -> Number:
+        """EI [N m^2] or rho I [kg m] of bending out of the plane of motion."""
+        return self.sideways
+
+    @property
+    def torsion(self) -> Number:
+        """See Section."""
+        return self.torque
+
+    def shear(self, poisson: Number) -> Number:
+        """See Section."""
+        return self.coefficient
+
+
 SECTIONS: Mapping[str, type[Section]] = {"rectangle": Rectangle, "round": Round, "tube": Tube, "i-beam": IBeam}
 """By the name that a scene gives them."""

@@ -15,11 +15,13 @@ from shoal.scene.scene import Scene
 def with_shear(scene: Scene) -> Scene | None:
     """The scene with shear and rotary inertia in its slender flexible rods.
 
-    None if there are none, or in space, which has no such element.
+    None if there are none or one's section has no numbers for it, or in space, which has no such element.
     """
     values: dict[str, Any] = {}
     for name, rod in scene.flexible_rods.items():
         if not rod.shears:
+            if rod.lacking("simo-reissner"):
+                return None
             count = rod.modes if rod.element == "modal" else rod.elements
             fields = {**rod.by_elements("simo-reissner", count), "quadrature": "full"}
             values |= {f"bodies.{name}.{field}": value for field, value in fields.items()} | unbent(scene, name)
@@ -48,8 +50,11 @@ def like_stout(rods: Mapping[str, Rod]) -> dict[str, Any]:
     for name, rod in rods.items():
         if rod.element == "rigid" and not rod.rotary_inertia:
             values[f"bodies.{name}.rotary_inertia"] = True
-        elif rod.element != "rigid" and rod.youngs_modulus is not None:
-            values[f"bodies.{name}.youngs_modulus"] = rod.youngs_modulus / (1.0 + slender_share(rod))
+            if rod.section == "numbers" and rod.rho_I is None:
+                values[f"bodies.{name}.rho_I"] = rod.masses_at(0.0)[1].bending
+        elif rod.element != "rigid" and rod.modulus is not None:
+            soft = 1.0 + slender_share(rod)
+            values |= {f"bodies.{name}.{field}": getattr(rod, field) / soft for field in rod.bending_fields}
     return values
 
 
@@ -57,5 +62,7 @@ def slender_share(rod: Rod) -> float:
     """By how much shear and rotary inertia lower the stiffness of a rod in bending, over its mass."""
     nu = rod.poisson_ratio
     section = rod.section_at(0.0)
+    _, heavy = rod.masses_at(0.0)
     slenderness = np.pi * np.sqrt(section.bending / section.area) / rod.length
-    return float(slenderness**2 * (2 * (1 + nu) / section.shear(nu) + 1.0))
+    turning = heavy.bending / heavy.area / (section.bending / section.area)
+    return float(slenderness**2 * (2 * (1 + nu) / section.shear(nu) + turning))

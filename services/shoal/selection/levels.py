@@ -121,7 +121,7 @@ def open_rods(scene: Scene) -> dict[str, str]:
     limits = {
         name: finest.get(body.element, body.element)
         for name, body in scene.bodies.items()
-        if isinstance(body, Rod) and body.youngs_modulus is not None
+        if isinstance(body, Rod) and body.modulus is not None
     }
     for name, limit in limits.items():
         if limit not in LADDERS:

@@ -71,8 +71,9 @@ def estimate(scene: Scene, rods: tuple[str, ...]) -> dict[str, PriorEstimate]:
         rod = scene.bodies[name]
         assert isinstance(rod, Rod)
         deflection = np.nan if motion is None else _deflection(scene, name, rod, motion)
-        assert rod.youngs_modulus is not None
-        speed = np.sqrt(rod.youngs_modulus / rod.density) * min(rod.section_at(0).gyration(scene.dimensions))
+        section, (density, heavy) = rod.section_at(0), rod.masses_at(0)
+        sound = np.sqrt(rod.modulus / density) * np.sqrt(section.area / heavy.area)
+        speed = sound * min(section.gyration(scene.dimensions))
         error = OVERSHOOT * deflection * (1.0 + growth)
         found[name] = PriorEstimate(deflection, growth, error, float(np.pi**2 * speed / rod.length**2))
     return found

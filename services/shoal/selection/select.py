@@ -274,9 +274,9 @@ def _open(scene: Scene) -> tuple[dict[str, str], dict[str, str], dict[str, int]]
     """Return the rods whose model is open with the element of their limit, the others with the reason, and `fewest`."""
     counts = dict[str, int]()
     closed = {
-        name: "no youngs_modulus"
+        name: "no EA and EI" if body.section == "numbers" else "no youngs_modulus"
         for name, body in scene.bodies.items()
-        if isinstance(body, Rod) and body.youngs_modulus is None
+        if isinstance(body, Rod) and body.modulus is None
     }
     limits = open_rods(scene)
     for rod, limit in limits.items():

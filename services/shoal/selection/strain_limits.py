@@ -33,9 +33,8 @@ def excessive_torques(scene: Scene, rods: Collection[str]) -> str:
             if not isinstance(rod, Rod) or not names:
                 continue
             section = rod.section_at(float(end == "end"))
-            assert rod.youngs_modulus is not None
             moment = sum(_at(scene.loads[name], body, end) for name in names)
-            strain = float(abs(moment) * section.height / (2 * rod.youngs_modulus * section.bending))
+            strain = float(abs(moment) * section.height / (2 * rod.modulus * section.bending))
             if strain > BEYOND:
                 said = f"the torque {names[0]} bends" if len(names) == 1 else f"the torques {', '.join(names)} bend"
                 return (

@@ -30,7 +30,7 @@ class BeamPart(Chain, BodyPart):
     @classmethod
     def add(cls, system: System, rod: Rod, pose: InitialPose) -> BeamPart:
         """Enter a straight rod at its initial pose."""
-        sections = Sections.of(rod)
+        sections = Sections.stout(rod, "simo-reissner")
         nodes, columns, elements = [], [], []
         for s in np.linspace(0.0, rod.length, 2 * rod.elements + 1):
             begin, rates = [*pose.position((s, 0.0)), pose.angle], [*pose.speed((s, 0.0)), pose.rate]

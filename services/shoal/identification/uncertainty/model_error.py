@@ -89,7 +89,11 @@ def _softened(
     model: ForwardModel, point: Array, predicted: Mapping[str, Array], slender: Mapping[str, Rod]
 ) -> Array | None:
     """By order of magnitude: in bending a rod with shear moves like one of a lower Young's modulus."""
-    softer = {f"bodies.{name}.youngs_modulus": 1.0 / (1.0 + slender_share(rod)) for name, rod in slender.items()}
+    softer = {
+        f"bodies.{name}.{field}": 1.0 / (1.0 + slender_share(rod))
+        for name, rod in slender.items()
+        for field in rod.bending_fields
+    }
     return difference(model, point, predicted, model.scene, softer)
 
 

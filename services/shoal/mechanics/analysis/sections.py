@@ -84,10 +84,10 @@ def sections(
     arcs: list[float] = []
     tangents, forces, moments = list[Array](), list[Array](), list[Array]()
     for number, elastic in enumerate(bodies.evaluator.element_forces(at, rate, rod)):
-        section = body.section_at((number + 0.5) / body.elements)
+        density, section = body.masses_at((number + 0.5) / body.elements)
         own = np.array([vector.own for vector in frame.of_element(number)])
-        inertia = np.array(element.mass(body.density, section, length)) @ change[own]
-        weight = np.outer(element.weight(body.density * section.area, length), load)
+        inertia = np.array(element.mass(density, section, length)) @ change[own]
+        weight = np.outer(element.weight(density * section.area, length), load)
         unit = np.array(element.weight(1.0, length))
         for one in along:
             force = np.array(padded(one.force, scene.dimensions))

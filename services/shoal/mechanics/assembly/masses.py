@@ -142,13 +142,14 @@ class Masses:
         nodes = [self._unstrained(rod, frame, node) for node in range(rod.elements + 1)]
         for number in range(rod.elements):
             if number == 0 or rod.tapered:
-                section = rod.section_at((number + 0.5) / rod.elements)
-                masses = element.mass(rod.density, section, length)
-                weight = element.weight(rod.density * section.area, length)
+                middle = (number + 0.5) / rod.elements
+                section, (density, heavy) = rod.section_at(middle), rod.masses_at(middle)
+                masses = element.mass(density, heavy, length)
+                weight = element.weight(density * heavy.area, length)
             vectors = frame.of_element(number)
             _add(self.mass, vectors, masses)
             if element.stretching is not None and self.scene.solver.caps_inertia:
-                _add(self.stretching, vectors, element.stretching(rod.youngs_modulus * section.area, length))
+                _add(self.stretching, vectors, element.stretching(rod.modulus * section.area, length))
             self._add_load(vectors, weight)
             for (node, _), vector in frame.axes.items():
                 if node in (number, number + 1):

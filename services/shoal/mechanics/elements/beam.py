@@ -209,7 +209,7 @@ def part(
     flat = len(nodal[0]) == plane.DIMENSIONS
     if rod.curvature and not flat:
         raise InputError(f"curvature: an {rod.element} is straight in space")
-    axial, bending = rod.youngs_modulus * section.area, rod.youngs_modulus * section.bending
+    axial, bending = rod.modulus * section.area, rod.modulus * section.bending
     numbers = [1.0 / length, axial * length, bending / length, rod.retardation + 0.0 * length]
     free = reference(vectors, rule, nodal, length) if flat else []
     return Entry(rule, variant, bool(np.any(rod.retardation)), numbers, free)

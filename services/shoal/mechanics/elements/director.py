@@ -216,7 +216,7 @@ def _at_rest(rod: Rod, length: Number, nodal: list[Number]) -> list[Number]:
 
 def _part(rod: Rod, section: Section, length: Number, nodal: list[Number], across: bool = False) -> Entry:
     free = _at_rest(rod, length, nodal)
-    young: Number = rod.youngs_modulus
+    young: Number = rod.modulus
     shear = young / (2 * (1 + rod.poisson_ratio))
     torsion = section.torsion if rod.torsion_constant is None else rod.torsion_constant
     bending = (section.side, section.bending) if across else (section.bending, section.side)

@@ -198,7 +198,7 @@ def entry(
 
 
 def _part(rod: Rod, section: Section, length: Number, nodal: list[Number]) -> Entry:
-    young: Number = rod.youngs_modulus
+    young: Number = rod.modulus
     nu = rod.poisson_ratio
     shearing = section.shear(nu) * young / (2 * (1 + nu)) * section.area
     free = _at_rest(length, nodal) if rod.curvature else [0.0] * STRAINS

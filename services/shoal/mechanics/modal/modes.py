@@ -114,8 +114,9 @@ def _of_rod(rod: Rod, ends: Ends) -> ModalIntegrals:
     """The integrals of the shapes of a uniform beam over a rod, which may be tapered."""
     x, weight = np.polynomial.legendre.leggauss(_POINTS + 8 * (rod.modes + rod.axial_modes))
     x, weight = (x[:, None] + 1) / 2, weight[:, None] / 2
-    length, section, young = np.atleast_1d(rod.length), rod.section_at(x), rod.youngs_modulus
-    line, turning = (rod.density * part * length * weight for part in (section.area, section.bending))
+    length, section, young = np.atleast_1d(rod.length), rod.section_at(x), rod.modulus
+    density, heavy = rod.masses_at(x)
+    line, turning = (density * part * length * weight for part in (heavy.area, heavy.bending))
     stretching, bending = (young * part * length * weight for part in (section.area, section.bending))
     across = [1j * beams.shapes(ends, rod.modes, x, k) / length**k for k in range(3)]
     none, one = np.zeros_like(x), np.ones_like(x)

@@ -26,6 +26,7 @@ from shoal.mechanics.assembly.space.attitudes import section
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
 from shoal.mechanics.frames import BeamFrame
 from shoal.scene import Attachment, Rod
+from shoal.scene.sections import Section
 from shoal.trajectory import Array
 
 PER_ELEMENT = 2
@@ -51,7 +52,7 @@ class SpatialBeamPart(Chain, BodyPart):
     def enter(cls, system: System, rod: Rod, placement: SpatialPlacement, name: str, q: Array, v: Array) -> Any:
         """Enter an unstrained rod whose nodes are where its frame is at the coordinates q and rates v."""
         fine = rod.model_copy(update={"elements": PER_ELEMENT * rod.elements})
-        sections = Sections.of(fine)
+        sections = Sections.stout(fine, "simo-reissner", "director-rod")
         stiffness, inertia = _stiffness(fine, sections), _inertia(fine, sections)
         nodes, columns, frames = [], [], []
         for s in np.linspace(0.0, rod.length, fine.elements + 1):
@@ -189,22 +190,21 @@ def _product(one: Array, other: Array) -> Array:
     return np.asarray((one**2 + one * other + other**2) / 3)
 
 
-def _moments(rod: Rod, sections: Sections) -> Array:
+def _moments(rod: Rod, section: Section) -> Array:
     """Polar second moment and those about y and z of every element [m^4], (elements, 3)."""
-    about_z, about_y = sections.section.bending, sections.section.side
+    about_z, about_y = section.bending, section.side
     return np.stack([one * np.ones(rod.elements) for one in (about_z + about_y, about_y, about_z)], axis=1)
 
 
 def _inertia(rod: Rod, sections: Sections) -> Array:
-    return rod.density * _moments(rod, sections)
+    return np.asarray(sections.density * _moments(rod, sections.heavy))
 
 
 def _stiffness(rod: Rod, sections: Sections) -> Array:
-    assert rod.youngs_modulus is not None
-    shear_modulus = rod.youngs_modulus / (2 * (1 + rod.poisson_ratio))
+    shear_modulus = rod.modulus / (2 * (1 + rod.poisson_ratio))
     torsion = sections.section.torsion if rod.torsion_constant is None else rod.torsion_constant
     twist = shear_modulus * torsion * np.ones(rod.elements)
-    bending = rod.youngs_modulus * _moments(rod, sections)[:, 1:]
+    bending = rod.modulus * _moments(rod, sections.section)[:, 1:]
     return np.column_stack([sections.axial, sections.shear, sections.shear, twist, bending])
 
 

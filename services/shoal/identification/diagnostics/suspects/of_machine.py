@@ -78,7 +78,7 @@ def _masses(scene: Scene, size: Size) -> Iterator[FaultHypothesis]:
     for name, body in scene.bodies.items():
         if len(scene.bodies) == 1 and not (isinstance(body, RigidBody) and np.any(body.inertia)):
             continue  # all forces go with its mass, but for friction, which is a candidate itself
-        field = "density" if isinstance(body, Rod) else "mass"
+        field = body.mass_field if isinstance(body, Rod) else "mass"
         yield _ratio(f"mass of {name}", f"bodies.{name}.{field}", float(getattr(body, field)))
     for name, body in scene.bodies.items():
         if isinstance(body, RigidBody) and (isinstance(body.inertia, tuple) or body.inertia > 0):

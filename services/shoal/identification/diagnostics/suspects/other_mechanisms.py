@@ -111,7 +111,7 @@ _ELEMENTS, _FOR_ANGLES = 2, 3
 
 
 def bending(model: ForwardModel) -> Iterator[FaultHypothesis]:
-    """Young's modulus of each rigid rod that may bend."""
+    """Young's modulus of each rigid rod that may bend and has a shape."""
     scene = model.scene
     size = size_of(scene)
     channels = [c for run in model.measurement.recordings.values() for c in run.channels]
@@ -119,7 +119,7 @@ def bending(model: ForwardModel) -> Iterator[FaultHypothesis]:
         return  # sensor channels are computed by rigid bodies only
     angles = any(not channel.is_position for channel in channels)
     for name, body in scene.bodies.items():
-        if not isinstance(body, Rod) or body.element != "rigid":
+        if not isinstance(body, Rod) or body.element != "rigid" or body.section == "numbers":
             continue
         middle = body.mass * size.gravity * body.length**2 / (8 * body.section_at(0.0).bending * _SAG)
         probes = middle * np.geomspace(1 / _STIFFER, _STIFFER, _WAYS)
