@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from shoal.engines import ENGINES
 from shoal.errors import InputError
+from shoal.identification.problem import Parameter
+from shoal.identification.recording.units import unit
 from shoal.mechanics.analysis.modes import modes
 from shoal.mechanics.simulate import simulate
 from shoal.scene import Rod, Scene
@@ -54,7 +56,7 @@ def test_a_rod_by_numbers_moves_as_its_shape(element: str) -> None:
     more = {"rotary_inertia": True} if element in ("rigid", "modal") else {}
     there, here = (simulate(pendulum(element, one, **more), TIMES) for one in (shape, NUMBERS))
     assert there.ok
-    np.testing.assert_allclose(here.points, there.points, rtol=0, atol=1e-11)
+    np.testing.assert_allclose(here.points, there.points, rtol=0, atol=1e-13)
     assert np.ptp(there.points[:, -1]) > 0.01
 
 
@@ -146,3 +148,11 @@ def test_a_rigid_rod_without_rotary_inertia_needs_its_mass_only() -> None:
     assert turning.inertia == pytest.approx(0.7 / 12 * (1 + H**2), rel=1e-12)
     with pytest.raises(InputError, match="rho_I is missing; in space a rigid rod"):
         rigid.with_values({"dimensions": 3, "gravity": [0.0, 0.0, 0.0]})
+
+
+def test_stiffnesses_have_units_and_are_fitted_by_their_order_of_magnitude() -> None:
+    assert [unit(f"bodies.rod.{name}") for name in ("rho_A", "rho_I_side", "EA", "EI", "GJ", "GA")] == [
+        *("kg/m", "kg m"),
+        *("N", "N m²", "N m²", "N"),
+    ]
+    assert Parameter(path="bodies.rod.EI", lower=1.0, upper=10.0).logarithmic
