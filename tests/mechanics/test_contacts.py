@@ -512,6 +512,17 @@ def test_a_ball_on_a_soft_floor_comes_to_rest_and_sticks() -> None:
     assert len(events(found, "sticks")) >= 1
 
 
+@pytest.mark.parametrize("law", [{"exponent": 1.5, "restitution": 0.6}, {"exponent": 1.0, "restitution": 0.9}, {}])
+def test_friction_under_a_law_ends_with_the_touch(law: dict[str, float]) -> None:
+    """A ball that bounces on a soft floor until it rolls; where the force ends no friction is left to decide on."""
+    contact = {"first": {"body": "B", "radius": 0.1}, "second": FLOOR, "mu": 0.2, "law": {"stiffness": 1e6, **law}}
+    ball = {"kind": "rigid-body", "mass": 1.0, "inertia": 0.004}
+    found = run(machine(ball, {"floor": contact}, {"position": [0.0, 0.3], "velocity": [0.5, 0.0]}, 1.5), balance=1e-7)
+    assert found.velocities is not None
+    assert found.velocities[0, 0, 0, 0] == pytest.approx(0.5 * 0.01 / 0.014, abs=1e-8)
+    assert len(events(found, "opens")) > 2
+
+
 @pytest.mark.parametrize("law", [{"restitution": 1.0}, {"law": {"stiffness": 1e8}}])
 @pytest.mark.parametrize("step", [{}, {"integrator": "leapfrog", "step": 1e-5}])
 def test_a_gap_that_closes_just_at_the_end_of_a_step_is_seen(law: dict[str, Any], step: dict[str, Any]) -> None:

@@ -105,7 +105,9 @@ def _rub(tile: Tile, m: Arrays, w: Work, lane: int) -> None:
                 w.power[lane] -= g.found[first + k] * g.slip[(first + k) * width + lane]
         if g.mode[at] == STICK:
             limit = coulomb.limit(m.gaps, g.given, contact, width, lane, g.found[first], True)
-            g.margin[at] = limit - np.sqrt(square)
+            # What gives way by less than can be seen opens next, at its limit though it may be.
+            hardly = m.gaps.soft[contact] != RIGID and -g.value[at] <= m.gaps.resolution
+            g.margin[at] = 0.0 if hardly else limit - np.sqrt(square)
 
 
 @njit(cache=True, error_model="numpy")
