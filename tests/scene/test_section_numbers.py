@@ -156,3 +156,14 @@ def test_stiffnesses_have_units_and_are_fitted_by_their_order_of_magnitude() -> 
         *("N", "N m²", "N m²", "N"),
     ]
     assert Parameter(path="bodies.rod.EI", lower=1.0, upper=10.0).logarithmic
+
+
+def test_the_error_of_neglected_shear_is_not_known_without_its_numbers() -> None:
+    import shoal
+
+    without = {key: value for key, value in NUMBERS.items() if key not in ("GA", "rho_I")}
+    found, known = (shoal.simulate(pendulum("ancf-cable", section), TIMES) for section in (without, NUMBERS))
+    assert found.errors.estimates["theory"] is None
+    assert "error-not-estimated" in found.codes
+    assert "bodies.rod.GA, bodies.rod.rho_I" in found.message
+    assert known.errors.estimates["theory"] is not None

@@ -19,7 +19,7 @@ from shoal.engines.capabilities import of_kind
 from shoal.engines.contract import Engine
 from shoal.engines.deviation import Deviation, turned
 from shoal.engines.gauss import GaussEngine
-from shoal.engines.theory import theory_deviations
+from shoal.engines.theory import theory_deviations, unstated
 from shoal.engines.undecided import Undecided, undecided
 from shoal.errors import ShoalError
 from shoal.mechanics.gap_history import moved
@@ -226,7 +226,11 @@ def of_mesh(seen: Examined) -> tuple[list[Deviation] | None, str]:
 def of_theory(seen: Examined) -> tuple[list[Deviation] | None, str]:
     """Estimate what slender rods leave out; see `theory`."""
     found = theory_deviations(seen.run, seen.scene, seen.native)
-    return found, "" if found is not None else "theory error not estimated: no run with shear can be believed"
+    if found is not None:
+        return found, ""
+    missing = ", ".join(unstated(seen.scene))
+    why = f"state {missing} for it" if missing else "no run with shear can be believed"
+    return None, f"theory error not estimated: {why}"
 
 
 def of_friction(seen: Examined) -> tuple[list[Deviation] | None, str]:

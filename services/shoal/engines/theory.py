@@ -40,6 +40,8 @@ def theory_deviations(
     _, slender = _rods(scene, trajectory.engine in WITH_SHEAR)
     if not slender:
         return []
+    if unstated(scene):
+        return None
     scenes = rigid_runs(scene, trajectory.engine)
     try:
         runs = [native.simulate(one, trajectory.times) for one in scenes]
@@ -53,6 +55,13 @@ def theory_deviations(
     except InputError:
         return None
     return [Deviation("theory", trajectory, run, (scene, softer))] if run.ok else None
+
+
+def unstated(scene: Scene) -> list[str]:
+    """Return the fields without which the shear of flexible rods that are stated by numbers is not known."""
+    return [
+        f"bodies.{name}.{field}" for name, rod in scene.flexible_rods.items() for field in rod.lacking("simo-reissner")
+    ]
 
 
 def rigid_runs(scene: Scene, engine: str = "gauss") -> list[Scene]:
