@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 import shoal
-from shoal.errors import InputError
+from shoal.errors import ComputationError, InputError
 from shoal.mechanics.linear_model import linearize
 from shoal.mechanics.simulate import simulate
 from shoal.scene import Scene
@@ -255,6 +255,37 @@ def test_states_of_the_user_are_states() -> None:
     )  # fmt: skip
     np.testing.assert_allclose(found.b[:, 0], [0, 0, 1 / inductance], rtol=1e-12, atol=1e-12)
     np.testing.assert_allclose(found.c, [[0, 1, 0], [0, 0, 1]], atol=1e-9)
+
+
+def test_smoothed_friction_is_a_slope_where_differences_are_taken() -> None:
+    """At the start out of balance: coulomb / coulomb_speed over the inertia."""
+    link = {"kind": "rigid-body", "mass": 2.0, "inertia": 0.1, "centre_of_mass": [0.3, 0.0]}
+    hinge = {
+        "first": {"body": "ground", "point": [0.0, 0.0]},
+        "second": {"body": "a"},
+        "coulomb": 5.0,
+        "coulomb_speed": 1e-3,
+    }
+    scene = Scene.parse({
+        "name": "rubs", "bodies": {"a": link}, "joints": {"J": hinge}, "markers": {"m": {"body": "a"}},
+        "loads": {"t": {"kind": "torque", "at": {"body": "a"}, "torque": 0.0}}, "initial": {"a": {"angle": -0.3}},
+    })  # fmt: skip
+    found = linearize(scene, ["t"], about="start")
+    assert found.a[1, 1] == pytest.approx(-5.0 / 1e-3 / (0.1 + 2.0 * 0.09), rel=1e-6)
+    assert "friction-as-slope" in found.codes
+
+
+def test_contacts_that_stick_are_refused_by_name() -> None:
+    contact = {"first": {"body": "b", "radius": 0.05}, "second": {"body": "ground", "line": 0.0}, "rolling": True}
+    scene = Scene.parse({
+        "name": "rolls", "bodies": {"b": {"kind": "rigid-body", "mass": 1.0, "inertia": 0.002}},
+        "contacts": {"f": contact}, "markers": {"m": {"body": "b"}}, "initial": {"b": {"position": [0.0, 0.05]}},
+        "loads": {"t": {"kind": "torque", "at": {"body": "b"}, "torque": 0.0}},
+    })  # fmt: skip
+    with pytest.raises(ComputationError, match=r"contacts\.f has friction"):
+        linearize(scene, ["t"], about="start")
+    with pytest.raises(ComputationError, match=r"contacts\.f has friction"):
+        shoal.modes(scene, about="start")
 
 
 def test_the_command_writes_the_matrices_for_other_tools(tmp_path: Any) -> None:

@@ -36,7 +36,10 @@ def _follow(address: int, tile: Tile, s: Array, m: Array, w: Array, t: float, z:
 
 
 def poles(model: Model) -> npt.NDArray[np.complex128]:
-    """Return the poles [1/s] of the first lane about its start, with damping by the rates that it has there."""
+    """Return the poles [1/s] of the first lane about its start, with damping by the rates that it has there.
+
+    nan where formulas have no value there.
+    """
     import scipy.linalg
 
     arrays, room = at_start(model, SINGLE, _LANE)
@@ -55,4 +58,6 @@ def poles(model: Model) -> npt.NDArray[np.complex128]:
         free = scipy.linalg.null_space(slopes @ inverse.T)
     stiffness, damping = (free.T @ inverse @ one @ inverse.T @ free for one in (stiffness, damping))
     nothing, one = np.zeros_like(stiffness), np.eye(len(stiffness))
+    if not (np.all(np.isfinite(stiffness)) and np.all(np.isfinite(damping))):
+        return np.full(2 * len(one), np.nan, dtype=complex)
     return np.asarray(np.linalg.eigvals(np.block([[nothing, one], [-stiffness, -damping]])), dtype=complex)

@@ -69,7 +69,7 @@ IMPACT_GAINS = _rejects(
     "impact-gains-energy",
     Status.ENERGY,
     "The law of impact, with these coefficients of restitution at once or with friction, gains energy.",
-    "the same restitution for contacts that strike together",
+    "less restitution or mu, the same restitution for contacts that strike together, or a law",
 )
 TORN_OPEN = _rejects("joint-torn-open", Status.DIVERGED, "A joint opens without a drive, and the motion ends there.")
 NOT_CLOSED = _rejects("joint-not-closed", Status.DRIFTED, "A joint is open by more than the solver allows.")

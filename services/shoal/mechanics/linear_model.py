@@ -29,7 +29,7 @@ from shoal.mechanics.analysis.balance import BALANCED, Balance
 from shoal.mechanics.analysis.damped import AT_MOST, Roots, small
 from shoal.mechanics.analysis.evaluate import Evaluator, Probe
 from shoal.mechanics.analysis.freedom import Metric
-from shoal.mechanics.analysis.modes import is_moving
+from shoal.mechanics.analysis.modes import is_moving, refuse_rough
 from shoal.mechanics.analysis.modes_findings import ModesStatus, status_of
 from shoal.mechanics.analysis.moving_slopes import Probed, slopes
 from shoal.mechanics.analysis.small_motions import BoundedMatrix
@@ -39,7 +39,7 @@ from shoal.mechanics.machine import Machine
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
 from shoal.mechanics.simulate import simulate
-from shoal.scene import DistributedForce, Force, PointMass, Scene, SignalFunction, Torque
+from shoal.scene import DistributedForce, Force, PointMass, Revolute, Scene, SignalFunction, Slider, Torque
 from shoal.scene.formula import Measure, Node
 from shoal.scene.signals import SLIDING, TURNING, Constant, StateValue, Table, check_leaves, is_of_time, written_out
 
@@ -50,6 +50,8 @@ WELL_POSED = 1e6
 DEPENDENT = 1e-6
 """A measure of which others leave a smaller part is none of a further direction."""
 RATES = {"angle": "rate", "slide": "slide_rate", "position": "velocity", "distance": "distance_rate"}
+COARSE = 1e-3
+"""Differences that are apart by more of the largest entry are no derivatives."""
 FAR = 1e-3
 """A zero beyond a thousand times the fastest pole is infinite."""
 SAMPLES = 2001
@@ -179,6 +181,10 @@ def linearize(
     """
     one_of("about", about, ABOUT)
     check(time=time)
+    if scene.states and about == "equilibrium":
+        raise InputError(f"states.{next(iter(scene.states))}: equilibria know no states yet; use about: start")
+    if about == "trajectory" and not time > 0.0:
+        raise InputError(f"time: a trajectory is linearized at a time after 0 s, found {time:g}")
     opened, signals = _open(scene, inputs, time)
     places = [*_places(opened)]
     users = tuple(StateValue(name) for name in scene.states)
@@ -191,6 +197,8 @@ def linearize(
     probe, count = evaluator.probe(state.q, state.v, time), len(places)
     if probe.kink:
         state.remarks.append(kinds.ON_A_KINK.found("a signal is where its derivative jumps: that on one side is taken"))
+    if not state.modes.shape[1]:
+        raise ComputationError(f"{scene.name}: nothing moves there: joints and contacts hold the machine")
     chosen, to = _states(probe.by_place[:count] @ state.modes)
     names = [str(places[k]) for k in chosen] or [f"mode {k + 1}" for k in range(len(to))]
     speeds = [str(asked[count + k]) for k in chosen] or [f"rate of {name}" for name in names]
@@ -199,16 +207,14 @@ def linearize(
     if state.balance is not None:
         a, c, poles = _at_rest(state.balance, state, probe, to, own)
         error = float(np.finfo(float).eps * np.linalg.cond(to)) if len(to) else 0.0
-    elif len(chosen) == len(to):
-        probed, sizes = (
-            Probed(chosen, [*(count + k for k in chosen), *kept], own),
-            [one.size for one in scene.states.values()],
-        )
-        found = slopes(evaluator, state.q, state.v, time, probed, span(scene), sizes)
+    elif chosen:
+        probed = Probed(chosen, [*(count + k for k in chosen), *kept], own)
+        smooth = [one.coulomb_speed for one in scene.joints.values() if isinstance(one, Revolute | Slider) and one.dry]
+        narrow, sizes = min(smooth, default=np.inf), [one.size for one in scene.states.values()]
+        found = slopes(evaluator, state.q, state.v, time, probed, span(scene), sizes, narrow)
         a, c, error, poles = found.a, found.c, found.error, None
-        state.remarks.append(
-            kinds.BY_DIFFERENCES.found(f"by differences, known to {found.error:.1g}", error=found.error)
-        )
+        kind = kinds.BY_DIFFERENCES if error < COARSE else kinds.DIFFERENCES_PART
+        state.remarks.append(kind.found(f"by differences, known to {error:.1g}", error=error))
     else:
         raise InputError("about: no angles and places of joints, bodies and markers describe this motion; add markers")
     # An input that acts on nothing is no constant of the model.
@@ -289,10 +295,13 @@ def _state_of(scene: Scene, about: str, time: float) -> _State:
     basis = Metric(evaluator.mass[own][:, own]).freedom(jacobian[:, own]).basis
     modes = np.zeros((len(q), basis.shape[1]))
     modes[own] = basis
-    return _State(q, v, modes, way, None, remarks)
+    slope = [one.kind.code == kinds.FRICTION_LEFT_OUT.code for one in remarks]
+    text = "dry friction is in it as the slope of its smoothed law: at rest it holds by coulomb / coulomb_speed"
+    return _State(q, v, modes, way, None, [kinds.FRICTION_SMOOTHED.found(text)] if any(slope) else [])
 
 
 def _resting(balance: Balance, q: Array, remarks: list[Finding]) -> _State:
+    refuse_rough(balance.evaluator.model.scene, balance)
     view = balance.look(q)
     stiffness = balance.at_rest(q, view).matrix
     shapes = balance.spectrum_of(BoundedMatrix((stiffness + stiffness.T) / 2, abs(stiffness)), view, AT_MOST).shapes

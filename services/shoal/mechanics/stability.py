@@ -55,6 +55,8 @@ def _closed_loop(model: Model, facts: Facts) -> float:
     Regions of stability are about ellipses with half axes along the frequencies and the rates of decay.
     """
     found = poles(model)
+    if not np.all(np.isfinite(found)):
+        return np.inf  # a formula without a value at the start, which the run tells
     decay = np.minimum(found.real, 0.0) / facts.stable_step_times_decay
     fastest = np.max(np.hypot(decay, found.imag / facts.stable_step_times_frequency), initial=0.0)
     return float(1.0 / fastest) if fastest > 0.0 else np.inf

@@ -155,7 +155,9 @@ class Limits:
             advice = "no step is short enough for it" if adaptive else "use a smaller step"
             ended = f"the motion is not finite {self._since(numbers[ENDED])}"
             advice = f"{advice}{', or ' + REACH if self._driven else ''}"
-            return kinds.NOT_FINITE.found(ended, advice, *self._laws, time=float(numbers[ENDED]))
+            formulas = ", ".join(self._model.signal_fields)
+            values = (f"see that {formulas} has a value all the way",) if formulas else ()
+            return kinds.NOT_FINITE.found(ended, *values, advice, *self._laws, time=float(numbers[ENDED]))
         if farthest > reach:
             text = f"a marker is {farthest:.3g} m away, the reach is {reach:.3g} m"
             return kinds.OUT_OF_REACH.found(text, distance=float(farthest), reach=reach)

@@ -156,6 +156,12 @@ class Balance:
         self.closed = [number for number in self.closed if number not in idle]
         return {self.contacts.names[k]: pressing[k] if k in self.closed else 0.0 for k in touching}
 
+    @property
+    def rough(self) -> list[str]:
+        """Closed contacts that have friction or roll, by which small motions stick to them, which they do not know."""
+        rubs = self.evaluator.gaps.rubs
+        return [self.contacts.names[k] for k in self.closed if rubs[self.contacts.numbers[k]] > 0]
+
     def pressed(self, q: Array) -> Pressing:
         """Return what the closed contacts exert at a state, among all contacts of the model."""
         normal = np.zeros(self.evaluator.gaps.size)

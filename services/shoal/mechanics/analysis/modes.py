@@ -367,6 +367,7 @@ def _modes(balance: Balance, scene: Scene, q: Array, count: int, about: str, rem
             f"{scene.name}: {', '.join(idle)} touches without a force: small motions open and close it; they have no "
             "frequencies"
         )
+    refuse_rough(scene, balance)
     view = balance.look(q)
     if names := crossing(evaluator, balance.metric, free, q, time):
         raise ComputationError(_singular(scene, names))
@@ -383,6 +384,15 @@ def _modes(balance: Balance, scene: Scene, q: Array, count: int, about: str, rem
     )
     balanced = balance.residual(view) <= BALANCED
     return Modes(scene, about, balanced, remarks, q, tuple(scene.markers), told)
+
+
+def refuse_rough(scene: Scene, balance: Balance) -> None:
+    """Raises ComputationError where closed contacts have friction: small motions stick to them."""
+    if names := balance.rough:
+        raise ComputationError(
+            f"{scene.name}: {', '.join(names)} has friction, and small motions that stick or roll are not known yet; "
+            "leave mu and rolling out of contacts that slide without"
+        )
 
 
 def _named_movers(mode: Eigenmode, scene: Scene) -> Eigenmode:

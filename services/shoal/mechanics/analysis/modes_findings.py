@@ -73,5 +73,13 @@ ON_A_KINK = Kind(
 BY_DIFFERENCES = Kind(
     "by-differences", Severity.NOTE, "A linear model about a state that moves or is not in balance is of differences."
 )
+DIFFERENCES_PART = _rejects(
+    "differences-disagree",
+    ModesStatus.UNTOLD,
+    "Differences of two steps disagree: the machine has no linear model there, as at a kink or a jump.",
+)
+FRICTION_SMOOTHED = Kind(
+    "friction-as-slope", Severity.CAUTION, "Dry friction is in a linear model by the slope of its smoothed law."
+)
 LOWEST_MODES = Kind("lowest-modes", Severity.NOTE, "A linear model is of the lowest modes of a large machine.")
 GROWS_AT = Kind("grows-at-speeds", Severity.NOTE, "At some speeds of the diagram a small motion grows.")

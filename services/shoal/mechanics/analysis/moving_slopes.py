@@ -44,17 +44,19 @@ class Slopes(NamedTuple):
 
 
 def slopes(
-    evaluator: Evaluator, q: Array, v: Array, t: float, probed: Probed, size: float, sizes: Sequence[float] = ()
-) -> Slopes:
+    evaluator: Evaluator, q: Array, v: Array, t: float, probed: Probed, size: float, sizes: Sequence[float] = (),
+    narrow: float = np.inf,
+) -> Slopes:  # fmt: skip
     """Return derivatives at a state q, v at time t [s].
 
-    size: of the machine, for places that are lengths [m]; sizes: of the states of the user.
+    size: of the machine, for places that are lengths [m]; sizes: of the states of the user; narrow: rates within which
+    a force changes [m/s or rad/s].
 
     Raises ComputationError where the places do not lead to a state of the machine.
     """
     n, m, begun = len(probed.places), len(probed.rates), _values(evaluator, q, v, t)
     base = np.concatenate([begun[probed.places], begun[probed.rates]])
-    fast = max(float(np.max(np.abs(base[n : 2 * n]), initial=0.0)), 1.0)
+    fast = min(max(float(np.max(np.abs(base[n : 2 * n]), initial=0.0)), 1.0), narrow)
     own = np.maximum(np.abs(base[2 * n :]), sizes)
     steps = STEP * np.concatenate([np.full(n, min(size, 1.0)), np.full(n, fast), own])
 
