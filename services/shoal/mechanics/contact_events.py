@@ -101,9 +101,13 @@ def _pulls(m: Arrays, w: Work, width: int, at: int) -> bool:
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def _turns(m: Arrays, w: Work, width: int, at: int) -> bool:
-    """Return whether friction of a closed contact is beyond its limit, or its slip has turned back."""
-    return m.gaps.rubs[at // width] > 0 and w.gaps.mode[at] != 0.0 and w.gaps.margin[at] < 0.0  # type: ignore[no-any-return]
+def _turns(m: Arrays, w: Work, width: int, at: int, taken: float) -> bool:
+    """Return whether friction of a closed contact is beyond its limit, or its slip has turned back.
+
+    Not by so little that it goes no way in a step of the length `taken` [s]: what is at rest slips to and fro by that.
+    """
+    least = m.gaps.resolution / taken if w.gaps.mode[at] == SLIP else 0.0
+    return m.gaps.rubs[at // width] > 0 and w.gaps.mode[at] != 0.0 and w.gaps.margin[at] < -least  # type: ignore[no-any-return]
 
 
 @njit(cache=True, error_model="numpy")
@@ -121,7 +125,7 @@ def first(
     for at in range(count):
         g.hit[at] = 0.0
         if g.closed[at] != 0.0:
-            holding = holding or g.dips[at] != 0.0 or _pulls(m, w, width, at) or _turns(m, w, width, at)
+            holding = holding or g.dips[at] != 0.0 or _pulls(m, w, width, at) or _turns(m, w, width, at, taken)
             near = near or g.left[at] < 0.0
         else:
             reach = 2.0 * taken * max(abs(g.before[RATE * count + at]), abs(g.rate[at]))
@@ -138,7 +142,7 @@ def first(
                 happens = g.left[at] < 0.0
                 if holding:
                     happens = happens or (g.before[FORCE * count + at] >= 0.0 and _pulls(m, w, width, at))
-                    happens = happens or (g.before[MARGIN * count + at] >= 0.0 and _turns(m, w, width, at))
+                    happens = happens or (g.before[MARGIN * count + at] >= 0.0 and _turns(m, w, width, at, taken))
             else:
                 dips = g.before[RATE * count + at] < 0.0 and g.rate[at] > 0.0
                 # What gives way may open before the surfaces have come apart.
@@ -188,7 +192,7 @@ def _earliest(
         arguments = (tile, scheme, m, w, k, t)
         if g.closed[at] != 0.0:
             _at(tile, scheme, m, w, k, t, right, taken, tolerance, holding)
-            pulls, turns = _pulls(m, w, width, at), _turns(m, w, width, at)
+            pulls, turns = _pulls(m, w, width, at), _turns(m, w, width, at, taken)
             if pulls and g.before[FORCE * count + at] >= 0.0:
                 where[at], about[at] = _root(*arguments, left, right, taken, tolerance, holding, at, FORCE), LIFT
             if turns and g.before[MARGIN * count + at] >= 0.0:
