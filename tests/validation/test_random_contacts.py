@@ -5,13 +5,16 @@ from __future__ import annotations
 import pytest
 from shoal_validation.random_contacts.study import judged
 
+MENDED = 40, 100, 114, 115
+"""Of these a slip turned to and fro at rest, touching balls struck twice, a jammed rod stuck, friction turned back."""
+
 
 @pytest.mark.compiles("kernels of contacts, which few machines need")
 @pytest.mark.parametrize(
-    "seed", [5, 7, 100, 114, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(8, 40))]
+    "seed", [5, 7, *MENDED, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(8, 40))]
 )
 def test_a_machine_drawn_at_random_moves_as_newton_and_euler_say(seed: int) -> None:
-    assert judged(seed).verdict in ("right", "refused", "not judged")
+    assert judged(seed).verdict in (("right",) if seed in MENDED else ("right", "refused", "not judged"))
 
 
 @pytest.mark.slow  # half a minute
