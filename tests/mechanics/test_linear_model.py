@@ -158,6 +158,8 @@ def test_a_rod_that_bends_is_described_by_its_modes() -> None:
                          "markers": {"end": {"body": "strip", "point": "end"}}})  # fmt: skip
     found = linearize(scene, ["tip"], ["position(end, y)"])
     assert found.states[0] == "mode 1"
+    with pytest.raises(InputError, match="outputs: missing"):
+        linearize(scene, ["tip"])
     modes = shoal.modes(scene, count=5, verify=False)
     swings = found.poles[found.poles.imag > 0.0]
     np.testing.assert_allclose(swings.imag[:5] / (2 * np.pi), modes.frequencies, rtol=1e-9)

@@ -85,7 +85,7 @@ class LinearModel(Concluded):
 
     @property
     def findings(self) -> list[Finding]:  # type: ignore[override]
-        """What was found out about the state, and whether the machine leaves it."""
+        """Findings about the state, and whether the machine leaves it."""
         found = []
         growing = self.poles[np.argmax(self.poles.real)] if len(self.poles) else 0.0
         if growing.real > 0.0:
@@ -109,7 +109,6 @@ class LinearModel(Concluded):
         n, m = len(self.a), len(self.inputs)
         if m != len(self.outputs) or m == 0:
             return None
-        # Scaled so that masses and stiffnesses of any size leave infinite zeros infinite.
         pencil = np.block([[self.a, self.b], [self.c, self.d]])
         metric = np.zeros_like(pencil)
         metric[:n, :n] = np.eye(n)
@@ -200,6 +199,8 @@ def linearize(
     if not state.modes.shape[1]:
         raise ComputationError(f"{scene.name}: nothing moves there: joints and contacts hold the machine")
     chosen, to = _states(probe.by_place[:count] @ state.modes)
+    if not (chosen or outputs):
+        raise InputError("outputs: missing; no places describe this machine, whose states are amplitudes of modes")
     names = [str(places[k]) for k in chosen] or [f"mode {k + 1}" for k in range(len(to))]
     speeds = [str(asked[count + k]) for k in chosen] or [f"rate of {name}" for name in names]
     kept = list(range(2 * count, 2 * count + len(users)))

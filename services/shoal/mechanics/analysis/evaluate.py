@@ -216,7 +216,7 @@ class Evaluator:
         return self._exerting(np.stack([normal, 0.0 * normal, 0.0 * normal], axis=1), 0.0 * normal)
 
     def sticking(self, q: Array, t: float = 0.0) -> Sticking:
-        """What keeps a machine at rest, with friction."""
+        """Forces that hold a machine at rest, with friction."""
         g, gaps, size, n = self._room.gaps, self.gaps, self.gaps.size, self.model.unknowns
         ways = 1 + gaps.tangents
         self._enter(q, None)

@@ -70,7 +70,7 @@ class Felt:
 
     @property
     def pressing(self) -> list[Pressing]:
-        """What contacts exert at every sample."""
+        """Forces of contacts at every sample."""
         return self._along[2]
 
     def specific_force(self, at: Attachment, tilt: Tilt = 0.0) -> Array:

@@ -1,4 +1,4 @@
-"""Linear models about a state that moves or is not in balance, in coordinates of the user's kind.
+"""Linearisation about a state that moves or is not in balance, by finite differences in minimal coordinates.
 
 Of places p of the machine that describe all its directions, and their rates and the states of the user r, r' = f(p, r,
 t) follows from the constraints and Gauss's principle at any state. A and C are differences of fourth order of f and of
