@@ -9,11 +9,11 @@ from shoal.json_values import json_text
 from shoal.mechanics.analysis.equilibrium import Equilibrium
 from shoal.pictures.design import design as draw_design
 from shoal.pictures.style import png
+from shoal.scene.edited import as_yaml
 from shoal.selection import Selection
 
 from shoal_flows.exports import Exports
 from shoal_flows.tracking.engines import log_errors, log_motion_of, stated
-from shoal_flows.tracking.model.files import as_yaml
 from shoal_flows.tracking.store import open_run
 from shoal_flows.verdicts import verdict
 

@@ -15,10 +15,10 @@ from shoal.pictures.files import rows
 from shoal.pictures.style import png
 from shoal.pictures.sweep import sweep as draw_sweep
 from shoal.scene import Scene
+from shoal.scene.edited import as_yaml
 from shoal.selection import Selection
 from shoal.trajectory import Trajectory
 
-from shoal_flows.tracking.model.files import as_yaml
 from shoal_flows.tracking.motion import log_ends, log_motion, tip
 from shoal_flows.tracking.store import Run, open_run
 from shoal_flows.verdicts import verdict

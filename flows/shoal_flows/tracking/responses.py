@@ -7,9 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 from shoal.json_values import json_text
 from shoal.response import Response
+from shoal.scene.edited import as_yaml
 
 from shoal_flows.tracking.engines import log_errors
-from shoal_flows.tracking.model.files import as_yaml
 from shoal_flows.tracking.store import Run, open_run
 from shoal_flows.verdicts import verdict
 

@@ -25,9 +25,9 @@ def scenes(name: str | None) -> None:
         _show_problems()
         return
     if (data := parametric(name)) is not None:
-        import yaml
+        from shoal.scene.edited import as_yaml
 
-        click.echo(yaml.safe_dump(data, sort_keys=False), nl=False)
+        click.echo(as_yaml(data), nl=False)
         return
     if name in scene_names():
         _print("scenes", name, scene_library())

@@ -87,10 +87,9 @@ def import_scene(
     file: Path, partial: bool, root: Any, stated: tuple[str, ...], no_contacts: bool, out: Out, as_json: bool
 ) -> None:
     """Write the machine of FILE (URDF, SDF or MuJoCo's MJCF) as a scene. What became what is listed on stderr."""
-    import yaml
-
     from shoal.errors import InputError
     from shoal.imported import read
+    from shoal.scene.edited import as_yaml
     from shoal.terminal import screen, tables
     from shoal.whole import whole
 
@@ -103,7 +102,7 @@ def import_scene(
         raise InputError(f"{file}: {what}; --partial writes the rest")
     path = out or Path(f"{found.scene['name']}.yaml")
     with whole(path) as part:
-        part.write_text(yaml.safe_dump(found.scene, sort_keys=False), encoding="utf-8")
+        part.write_text(as_yaml(found.scene), encoding="utf-8")
     report = {
         "status": "ok", "file": str(path), "rows": [one._asdict() for one in found.rows], "left_out": found.left_out,
         "missing": found.missing, "notes": found.notes, "warnings": found.warnings,

@@ -44,6 +44,10 @@ _SECONDS = {
     "step of ImplicitGauss": 2.0,
     "energy": 1.0,
     "energies": 1.0,
+    "contact": 8.0,
+    "decide": 8.0,
+    "hold": 3.0,
+    "look": 2.0,
 }
 """Seconds that large kernels take to compile on one core of a server: for their order and the estimate shown."""
 _OF_ALL = ("Arrays", "Work")

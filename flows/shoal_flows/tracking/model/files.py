@@ -10,10 +10,10 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-import yaml
 from shoal.identification import Problem, load_problem
 from shoal.identification.recording.measurement import Recording
 from shoal.scene import Scene
+from shoal.scene.edited import as_yaml
 
 from shoal_flows.jobs import Fit
 
@@ -86,11 +86,6 @@ def _example(fit: Fit) -> Any:
 
 def _scene(scene: Scene) -> str:
     return as_yaml(scene.model_dump(mode="json"))
-
-
-def as_yaml(data: Any) -> str:
-    """YAML; every number comes back as it was."""
-    return yaml.safe_dump(data, sort_keys=False, default_flow_style=None, allow_unicode=True, width=120)
 
 
 def _asked(problem: Problem, sources: dict[str, dict[str, Any]]) -> dict[str, Any]:
