@@ -51,6 +51,33 @@ def test_a_step_at_half_the_time_is_at_half_the_time(end: float) -> None:
 
 
 @pytest.mark.parametrize(
+    "text",
+    [
+        "ramp(sin(5.062*t))",
+        "abs(sin(t) - 1)",
+        "min(1, sin(3*t))",
+        "max(sin(2*t), 1)",
+        "max(cos(7*t), -1)",
+        "ramp(1 + cos(4*t))",
+        "abs((t - 0.5)**2)",
+        "ramp(1 - (2*t - 1)**2)",
+    ],
+)
+@pytest.mark.parametrize("end", [1.0, 1.5, 10.0])
+def test_a_switch_that_is_touched_half_way_turns_nothing(text: str, end: float) -> None:
+    """The peak of a half period is in its middle."""
+    pieces = branches(tree(text), 0.0, end)
+    times = np.linspace(0.0, end, 997)[1:-1]
+    found = [float(value(pieces.around(t, left=True), t)) for t in times]
+    np.testing.assert_allclose(found, evaluate_array(text, {"t": times}), atol=1e-12)
+
+
+def test_a_root_of_what_is_nowhere_positive_is_refused() -> None:
+    with pytest.raises(InputError, match=r"takes sqrt of .* negative"):
+        branches(tree("sqrt(sin(t) - 1)"), 0.0, np.pi)
+
+
+@pytest.mark.parametrize(
     ("text", "end", "why"),
     [
         ("1/(t - 1)", 2.0, r"'1/\(t - 1\)' has a pole: t - 1 is 0 at t = 1;"),

@@ -27,6 +27,8 @@ _MOST_SWITCHES = 20_000
 _ULP = 2.0**-52
 _NOWHERE = 2.0**-100
 """Fraction of the range that is too short to be bisected further, beside the spacing of numbers."""
+_INSIDE = (0.5, (3.0 - 5.0**0.5) / 2.0, 2.0**-0.5)
+"""Where in a piece the sign of a tree is looked at: half-way, where it may touch 0 by symmetry, and elsewhere."""
 
 
 class Branches(NamedTuple):
@@ -84,9 +86,12 @@ class _Cutter:
             beyond = [make("-", node, 1.0) for node in first]
             finer = np.unique(np.concatenate([finer, self._roots(operation, edges, beyond)]))
         number = _number(edges, finer)
-        middle = self._middles(finer, [tested[k] for k in number])
-        nodes = [_branch(operation, middle[n], *(column[k] for column in columns)) for n, k in enumerate(number)]
-        return Branches(finer, nodes)
+        sign = self._signs(finer, [tested[k] for k in number])
+        over = self._signs(finer, [beyond[k] for k in number]) if operation == "ramp" else np.zeros(len(number))
+        rows = zip(sign, over, number, strict=True)
+        return Branches(
+            finer, [_branch(operation, one, other, *(part[k] for part in columns)) for one, other, k in rows]
+        )
 
     def guard(self, operation: str, edges: Array, columns: list[list[Node]]) -> Branches:
         """Quotients, powers, logarithms, square roots and tangents, refused where they have a pole or no value."""
@@ -94,9 +99,9 @@ class _Cutter:
         tested = [_critical(operation, row) for row in rows]
         finer = self._roots(operation, edges, tested)
         number = _number(edges, finer)
-        middle = self._middles(finer, [tested[k] for k in number])
+        sign = self._signs(finer, [tested[k] for k in number])
         for n, k in enumerate(number):
-            if operation in ("sqrt", "log", "**") and middle[n] < 0:
+            if operation in ("sqrt", "log", "**") and sign[n] < 0:
                 self._refuse(f"takes {_named(operation)} of {written(tested[k])}, which is negative", finer[n])
         for n, k in enumerate(number):
             for t in finer[n : n + 2].tolist():
@@ -113,11 +118,14 @@ class _Cutter:
         why = f"has a pole: {written(tested)} is 0"
         self._refuse(why, t, "; keep it away from 0, by max() or a small term")
 
-    def _middles(self, edges: Array, nodes: list[Node]) -> Array:
-        """The value of every piece's tree half-way."""
+    def _signs(self, edges: Array, nodes: list[Node]) -> Array:
+        """Return the sign of every piece's tree, which touches 0 inside at most, as sin(t) - 1 does."""
         out = np.zeros(len(nodes))
         for node, numbers in Branches(edges, nodes).groups().items():
-            out[numbers] = _values(node, (edges[numbers] + edges[numbers + 1]) / 2)
+            width = edges[numbers + 1] - edges[numbers]
+            inside = np.array([_values(node, edges[numbers] + part * width) for part in _INSIDE])
+            largest = np.argmax(np.abs(inside), axis=0)
+            out[numbers] = np.sign(np.take_along_axis(inside, largest[None], 0)[0])
         return out
 
     def _roots(self, operation: str, edges: Array, nodes: list[Node]) -> Array:
@@ -216,15 +224,17 @@ def _number(edges: Array, finer: Array) -> Array:
     return np.searchsorted(edges, finer[:-1], side="right") - 1
 
 
-def _branch(operation: str, test: float, *arguments: Node) -> Node:
-    """Return the smooth expression of an operation where the tested number has the sign of `test`."""
+def _branch(operation: str, test: float, beyond: float, *arguments: Node) -> Node:
+    """Return the smooth expression of an operation where the tested number has the sign of `test`, and, of ramp, that
+    less 1 the sign of `beyond`.
+    """
     first = arguments[0]
     if operation == "step":
         return 1.0 if test >= 0 else 0.0
     if operation == "abs":
         return first if test >= 0 else make("neg", first)
     if operation == "ramp":
-        return 0.0 if test <= 0 else 1.0 if test >= 1 else make("rise", first)
+        return 0.0 if test <= 0 else 1.0 if beyond >= 0 else make("rise", first)
     return first if (test <= 0) == (operation == "min") else arguments[1]
 
 
