@@ -294,7 +294,7 @@ def test_joints_in_a_ratio_move_as_in_mujoco(ratio: float, axis: str, base: str,
     path.write_text(GEARS.format(base=base, end="</body>" * bool(base), place="0 .1 0", axis=axis, ratio=ratio))
     found = read(path)
     assert found.missing == ()
-    assert found.scene["joints"]["e"]["kind"] == "transmission"
+    assert found.scene["joints"]["e"]["kind"] == "coupling"
     assert distance(path, found) < 2e-4
 
 

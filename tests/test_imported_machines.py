@@ -284,10 +284,10 @@ TENDONS = """<mujoco><option gravity="0 0 -9.81"><flag contact="disable"/></opti
 </tendon><equality><tendon tendon1="t" solref="2e-4 1" solimp=".99999 .99999 .001 .5 2"/></equality></mujoco>"""
 
 
-def test_an_equality_of_a_tendon_over_joints_is_a_transmission(tmp_path: Path) -> None:
+def test_an_equality_of_a_tendon_over_joints_is_a_coupling(tmp_path: Path) -> None:
     path = written(TENDONS, tmp_path)
     found = read(path)
     assert found.missing == ()
     (kind,) = {one["kind"] for name, one in found.scene["joints"].items() if name not in ("h", "p", "s")}
-    assert kind == "transmission"
+    assert kind == "coupling"
     assert apart(path, found.scene) < 1e-5

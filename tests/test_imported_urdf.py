@@ -232,7 +232,7 @@ def test_a_joint_that_mimics_another_follows_it(tmp_path: Path) -> None:
     inside += joint("g", "hand", "two", "1 0 0", "0 -.02 .1", mimic, kind="prismatic")
     found = read(written(tmp_path, inside))
     assert found.missing == ()
-    assert found.scene["joints"]["g-mimic"]["kind"] == "transmission"
+    assert found.scene["joints"]["g-mimic"]["kind"] == "coupling"
     model = mujoco.MjModel.from_xml_string("""<mujoco><option integrator="RK4" timestep="1e-4"/><worldbody><body>
       <joint axis="0 1 .3"/><inertial pos="0 0 .05" mass=".5" diaginertia="1e-3 1e-3 5e-4"/>
       <body name="one" pos="0 .02 .1"><joint name="f" type="slide" axis="1 0 .2"/>

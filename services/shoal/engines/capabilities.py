@@ -9,7 +9,7 @@ from shoal.engines.contract import Engine
 from shoal.engines.known import ENGINES
 from shoal.errors import InputError
 from shoal.scene import GROUND, Coupling, Function, Joint, Load, PointMass, Rod, Scene, SignalFunction
-from shoal.scene.joints import Transmission, places
+from shoal.scene.joints import places
 from shoal.scene.signals import depends_on_time
 
 T = TypeVar("T")
@@ -91,7 +91,7 @@ def needs(scene: Scene) -> Iterator[tuple[str, str]]:
         yield f"ground_points.{name}", "moving ground points"
     for name, joint in scene.joints.items():
         yield from _item(f"joints.{name}", joint)
-        if not isinstance(joint, Coupling | Transmission) and joint.first.body == joint.second.body:
+        if not isinstance(joint, Coupling) and joint.first.body == joint.second.body:
             yield f"joints.{name}", "closed rods"
     yield from ((f"joints.{name}", "closed loops") for name in loops(scene))
     for name, contact in scene.contacts.items():
@@ -131,7 +131,7 @@ def loops(scene: Scene) -> Iterator[str]:
         joined = {group[side.body] for side in places(joint)}
         if len(joined) <= 1:
             yield name
-        if not joined:  # a transmission, of other joints
+        if not joined:  # a coupling of measures
             continue
         first = min(joined)
         group = {body: first if owner in joined else owner for body, owner in group.items()}

@@ -1,8 +1,7 @@
-"""Equalities: loops closed by `connect` and `weld` of bodies, and transmissions by linear ones of joints."""
+"""Equalities: loops closed by `connect` and `weld` of bodies, and couplings by linear ones of joints."""
 
 from __future__ import annotations
 
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -11,11 +10,11 @@ from scipy.spatial.transform import Rotation
 from shoal.imported.parts import Parts
 from shoal.imported.rounding import ROUNDED, Array
 from shoal.imported.source import Source
-from shoal.scene.joints import MOST_TEETH
+from shoal.scene.formula import Measure
 
 
 def add_equalities(source: Source, parts: Parts) -> None:
-    """Add the joints of equalities, after the tendons: closed loops and transmissions; lines for others."""
+    """Add the joints of equalities, after the tendons: closed loops and couplings; lines for others."""
     model, kinds = source.model, source.mujoco.mjtEq
     for number, name in enumerate(source.called(source.mujoco.mjtObj.mjOBJ_EQUALITY, model.neq, "loop")):
         if number in parts.kept:
@@ -48,17 +47,17 @@ def _coupled(source: Source, number: int) -> str:
 
 
 def _coupling(source: Source, number: int, parts: Parts) -> dict[str, Any] | None:
-    """The transmission of a linear equality of hinges and slides; the ratio of hinges is rounded to whole teeth."""
+    """The coupling of a linear equality of hinges and slides."""
     driven, driving = int(source.model.eq_obj1id[number]), int(source.model.eq_obj2id[number])
     factor, *curved = source.model.eq_data[number][1:5]
     if driving >= 0 and any(curved):
         return None
     terms = [(driven, 1.0)] + ([(driving, -float(factor))] if driving >= 0 and factor else [])
-    return transmission(source, terms, parts)
+    return coupling(source, terms, parts)
 
 
 def _of_tendons(source: Source, number: int, parts: Parts) -> dict[str, Any] | None:
-    """The transmission of a linear equality of fixed tendons, whose lengths are sums of coordinates of joints."""
+    """The coupling of a linear equality of fixed tendons, whose lengths are sums of coordinates of joints."""
     model = source.model
     tendon, other = int(model.eq_obj1id[number]), int(model.eq_obj2id[number])
     factor, *curved = model.eq_data[number][1:5]
@@ -72,14 +71,15 @@ def _of_tendons(source: Source, number: int, parts: Parts) -> dict[str, Any] | N
             found[joint] = found.get(joint, 0.0) + share * float(model.wrap_prm[wrap])
     if (other >= 0 and any(curved)) or model.eq_data[number][0]:
         return None
-    return transmission(source, [one for one in found.items() if one[1]], parts)
+    return coupling(source, [one for one in found.items() if one[1]], parts)
 
 
-def transmission(source: Source, terms: list[tuple[int, float]], parts: Parts) -> dict[str, Any] | None:
-    """The transmission of joints with factors of their coordinates; none where a joint is no hinge or slide alone."""
-    shares, hinges = [], list[float]()
+def coupling(source: Source, terms: list[tuple[int, float]], parts: Parts) -> dict[str, Any] | None:
+    """The coupling of joints with factors of their coordinates; none where a joint is no hinge or slide alone."""
+    counted = []
     for one, factor in terms:
-        made, kind = parts.joints.get(source.joint_names[one], {}), source.model.jnt_type[one]
+        name = source.joint_names[one]
+        made, kind = parts.joints.get(name, {}), source.model.jnt_type[one]
         types = source.mujoco.mjtJoint
         kinds = {"revolute": int(types.mjJNT_HINGE), "slider": int(types.mjJNT_SLIDE)}
         if kinds.get(made.get("kind", "")) != kind:
@@ -87,14 +87,9 @@ def transmission(source: Source, terms: list[tuple[int, float]], parts: Parts) -
         # Where a joint is drawn from the body to its parent, its motion is the opposite.
         if made["first"]["body"] == source.names[source.model.jnt_bodyid[one]]:
             factor = -factor
-        if made["kind"] == "revolute":
-            hinges.append(factor)
-            ratio = Fraction(factor / hinges[0]).limit_denominator(MOST_TEETH)
-            if abs(float(ratio) * hinges[0] - factor) > 1e-12 * abs(factor):
-                parts.notes.append(f"joint {source.joint_names[one]}: its ratio {factor / hinges[0]:.12g} is {ratio}")
-            factor = float(ratio) * hinges[0]
-        shares.append({"joint": source.joint_names[one], "factor": factor})
-    return {"kind": "transmission", "terms": shares}
+        measure = "angle" if made["kind"] == "revolute" else "slide"
+        counted.append({"of": Measure(measure, (name,)).text, "factor": factor})
+    return {"kind": "coupling", "terms": counted}
 
 
 def _joint(source: Source, number: int, weld: bool) -> dict[str, Any] | None:

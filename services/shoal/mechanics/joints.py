@@ -6,23 +6,20 @@ start (`start.closure`) and pushes where its conditions forbid a motion (`analys
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
 from shoal.errors import InputError
-from shoal.mechanics.affine import fixed
+from shoal.mechanics.conditions import JointCondition, UnitVectors
 from shoal.mechanics.numerics.tile import Number
+from shoal.mechanics.sums import BodyAngle, Sum, parts_of
 from shoal.scene import Function, Scene
 from shoal.scene.joints import (
     GROUND,
-    MOST_TEETH,
     Attachment,
-    CoupledCoordinate,
     Coupling,
     Cylindrical,
     Distance,
@@ -32,48 +29,13 @@ from shoal.scene.joints import (
     Perpendicular,
     Planar,
     Revolute,
-    Share,
     Slider,
     Spherical,
-    Transmission,
     Universal,
     Weld,
     is_loose,
 )
 from shoal.scene.record import Vector3
-
-UnitVectors = dict[str, Any]
-"""By the name of an unknown force or torque, at every sample, (samples, d) each."""
-
-
-class JointCondition:
-    """A condition of a joint between two places: its residual terms, and the forces that keep it.
-
-    The forces act on the second body at the second place, and oppositely on the first body there, and do no work in any
-    motion that the condition permits. A name in both mappings is one unknown, a force and a torque in proportion.
-    motion: of the free bodies, an `analysis.free_motion.FreeMotion`
-    """
-
-    @property
-    def is_of_start(self) -> bool:
-        """Return whether it keeps the value that the start has, which is not stated."""
-        return False
-
-    def constrain(self, name: str, bodies: Any) -> None:
-        """Add the residual terms, which vanish where the condition holds, to `bodies.terms`.
-
-        name: of the joint. bodies: places and directions as vectors of the coordinates, either those of the machine
-        (`assembly.coordinates.Placement`) or of separate rigid bodies (`start.closure.Closure`).
-        """
-        raise unknown(self)
-
-    def pushes(self, motion: Any) -> UnitVectors:
-        """Return the forces per unit."""
-        return {}
-
-    def twists(self, motion: Any) -> UnitVectors:
-        """Return the torques per unit."""
-        return {}
 
 
 @dataclass(frozen=True)
@@ -191,103 +153,6 @@ class Turned(JointCondition):
 
 
 @dataclass(frozen=True)
-class Geared(JointCondition):
-    """Whole numbers times the angles of directions add up to what they do at the start, or differ by whole turns.
-
-    So teeth do that mesh: of gears with m and n teeth m turns of one are n turns of the other. axes: in space, what
-    each turns about, as it points at the start.
-    """
-
-    sides: tuple[Attachment, ...]
-    teeth: tuple[int, ...]
-    axes: tuple[Vector3, ...]
-
-    @property
-    def is_of_start(self) -> bool:
-        """Return true: the sum is that of the start."""
-        return True
-
-    @property
-    def factors(self) -> tuple[float, ...]:
-        """Return the factors of the angles, the largest of them 1."""
-        return tuple(count / self.most for count in self.teeth)
-
-    @property
-    def most(self) -> int:
-        """The largest number."""
-        return max(map(abs, self.teeth))
-
-    def constrain(self, name: str, bodies: Any) -> None:
-        """Require the weighted sum of the angles that the start has, but for whole teeth."""
-        turning = zip(self.factors, self.sides, self.axes, strict=True)
-        angles = [
-            (factor, bodies.angle(name, side, axis)) for factor, side, axis in turning if factor and side.body != GROUND
-        ]
-        if angles:
-            bodies.terms.mesh(name, angles, 2 * np.pi / self.most)
-
-
-@dataclass(frozen=True)
-class Transmitted(JointCondition):
-    """The sum of factor * free motion of joints stays that of the start, angles but for teeth that mesh again."""
-
-    shares: tuple[Share, ...]
-
-    @property
-    def is_of_start(self) -> bool:
-        """Return true: the sum is that of the start."""
-        return True
-
-    def constrain(self, name: str, bodies: Any) -> None:
-        """Require the sum of the unknowns that the machine has for it; separate bodies start as they do."""
-        phases = getattr(bodies, "phases", {})
-        if not phases:
-            return
-        turning = [one for one in self.shares if isinstance(bodies.scene.joints[one.joint], Revolute) and one.factor]
-        ways = [one for one in self.shares if one not in turning]
-        first = fixed(np.eye(3)[0][:, None])
-        bodies.terms.mesh(
-            name,
-            [(one.factor, phases[one.joint]) for one in turning],
-            _period(name, [one.factor for one in turning]),
-            lengths=int(bool(ways)),
-            further=[(first, phases[one.joint] * one.factor) for one in ways],
-        )
-
-
-def _period(name: str, factors: list[float]) -> float:
-    """Return the least sum of factors times whole turns [rad]. Raises InputError for ratios of too many teeth."""
-    if not factors:
-        return 1.0
-    ratios = [Fraction(one / factors[0]).limit_denominator(MOST_TEETH) for one in factors]
-    for ratio, factor in zip(ratios, factors, strict=True):
-        if abs(float(ratio) * factors[0] - factor) > 1e-12 * abs(factor) or abs(ratio.numerator) > MOST_TEETH:
-            raise InputError(
-                f"joints.{name}.terms: factors {factors[0]:.12g} and {factor:.12g} of hinges: their ratio must be a "
-                f"fraction of whole numbers up to {MOST_TEETH}; the nearest is {ratio}"
-            )
-    return 2.0 * np.pi * abs(factors[0]) / math.lcm(*(one.denominator for one in ratios))
-
-
-@dataclass(frozen=True)
-class Sum(JointCondition):
-    """The sum of factor * coordinate follows a function of time [m]."""
-
-    terms: tuple[CoupledCoordinate, ...]
-    value: Function
-
-    def constrain(self, name: str, bodies: Any) -> None:
-        """Require the sum of the coordinates."""
-        axes = np.eye(bodies.scene.dimensions)
-        first = fixed(axes[0][:, None])
-        total = fixed(0.0 * first.constant)
-        for term in self.terms:
-            onto_first = np.outer(axes[0], term.factor * axes["xyz".index(term.axis)])
-            total = total + bodies.point(bodies.scene, term.at).turned(onto_first)
-        bodies.terms.dot(name, first, total, 1, drive=self.value.through("neg"))
-
-
-@dataclass(frozen=True)
 class Aligned(JointCondition):
     """An axis of both bodies; None: the first body's x axis, parallel to the second's, whichever way that points."""
 
@@ -375,7 +240,10 @@ def _gear(joint: Gear) -> list[JointCondition]:
         raise InputError("ratio of a gear: is of whole teeth, so that it cannot vary; state each in a scene of its own")
     m, n = joint.fraction.numerator, joint.fraction.denominator
     first, second = joint.axes
-    return [Geared((joint.second, joint.first, joint.carrier), (n, -m, m - n), (second, first, first))]
+    sides, axes = (joint.second, joint.first, joint.carrier), (second, first, first)
+    most = max(map(abs, (n, -m, m - n)))
+    turning = zip((n, -m, m - n), sides, axes, strict=True)
+    return [Sum(tuple((teeth / most, BodyAngle(side, axis)) for teeth, side, axis in turning), None, "torque")]
 
 
 CONDITIONS: dict[type, Callable[[Any], list[JointCondition]]] = {
@@ -387,7 +255,7 @@ CONDITIONS: dict[type, Callable[[Any], list[JointCondition]]] = {
     Perpendicular: lambda joint: [Turned(joint.first, joint.second, either=(np.pi / 2, -np.pi / 2))],
     DrivenAngle: lambda joint: [Turned(joint.first, joint.second, joint.angle)],
     Gear: _gear,
-    Coupling: lambda joint: [Sum(joint.terms, joint.value)],
+    Coupling: lambda joint: [Sum(parts_of(joint.terms), joint.sum)],
 }
 
 
@@ -416,7 +284,6 @@ SPATIAL: dict[type, Callable[[Any], list[JointCondition]]] = {
     Slider: _spatial_slider,
     Distance: CONDITIONS[Distance],
     Parallel: lambda j: [Aligned(j.first, j.second, None)],
-    Transmission: lambda joint: [Transmitted(joint.terms)],
     Perpendicular: lambda j: [Square(j.first, j.second, None, None)],
     DrivenAngle: lambda j: [Hinged(j.first, j.second, j.angle, j.axis)],
     Gear: _gear,
@@ -439,11 +306,6 @@ def conditions(joint: Any, dimensions: int = 2) -> list[Any]:
     if is_loose(joint):
         return []  # contacts hold it, see `assembly.contacts`
     return table[type(joint)](joint)
-
-
-def unknown(condition: Any) -> NotImplementedError:
-    """Return the error for a condition whose terms or forces are not stated."""
-    return NotImplementedError(f"the condition {type(condition).__name__} does not state its residual terms here")
 
 
 def of_scene(scene: Scene) -> Iterator[tuple[str, Any]]:

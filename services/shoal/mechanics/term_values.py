@@ -19,24 +19,22 @@ from shoal.mechanics.terms import Term
 
 
 class TermValues:
-    """Terms as arrays. roots: numbers of the terms u' u of which the root is asked for, a length.
+    """Terms as arrays. counted: whether vectors of angles have the angle itself, with all turns, as first component."""
 
-    counted: whether the vectors of angles have the angle itself as their first component, with all turns
-    """
-
-    def __init__(
-        self, terms: Sequence[Term], dimensions: int, roots: Sequence[int] = (), counted: bool = False
-    ) -> None:
+    def __init__(self, terms: Sequence[Term], dimensions: int, counted: bool = False) -> None:
         self.count, self._counted = len(terms), counted
         products = [(row, pair) for row, one in enumerate(terms) for pair in one.pairs]
         angles = [(row, *part) for row, one in enumerate(terms) for part in one.angles]
         vectors = [*((row, u) for row, (u, _, _) in products), *((row, w) for row, (_, w, _) in products)]
         vectors += [(row, vector) for row, _, vector in angles]
+        roots = [(row, *part) for row, one in enumerate(terms) for part in one.roots]
+        vectors += [(row, vector) for row, _, vector in roots]
+        self._rooted = np.array([[row == one for one in range(len(terms))] for row, *_ in roots], dtype=float)
+        self._scales = laned([np.atleast_1d(factor) for _, factor, _ in roots], ())
         self._products = _index([row for row, _ in products])
         self._angled = np.array([[row == one for one in range(len(terms))] for row, *_ in angles], dtype=float)
         self._factors = laned([np.atleast_1d(factor) for _, factor, _ in angles], ())
         self._form = np.array([form for _, (*_, form) in products]).reshape(-1, dimensions, dimensions)
-        self._roots = np.isin(self._products, _index(roots))
         self._constant = laned([vector.constant.T for _, vector in vectors], (dimensions,))
         self._drives = [one.drive for one in terms]
         drives = [0.0 if one.drive is None else start_value(one.drive) for one in terms]
@@ -56,29 +54,23 @@ class TermValues:
     def of_lanes(self, lanes: Index) -> TermValues:
         """Return the terms of some lanes."""
         other = copy(self)
-        for name in ("_constant", "offset", "_coefficients", "_factors"):
+        for name in ("_constant", "offset", "_coefficients", "_factors", "_scales"):
             setattr(other, name, of_lanes(getattr(self, name), lanes))
         return other
 
     def at(self, q: Array) -> tuple[Array, Array]:
         """Return the values, and the parts of the Jacobian, (lanes, parts), which add up."""
         count = len(self._products)
-        each = (q, self._constant, self.offset, self._coefficients, self._factors)
+        each = (q, self._constant, self.offset, self._coefficients, self._factors, self._scales)
         lanes = max(map(len, each))
         vectors = np.repeat(self._constant, lanes // len(self._constant), axis=0)
         steps = self._coefficients * q[:, self.unknowns, None]
         for part in self.groups:
             vectors[:, self._numbers[part]] += steps[:, part]
-        u, w, turned = vectors[:, :count], vectors[:, count : 2 * count], vectors[:, 2 * count :]
+        turning = 2 * count + len(self._angled)
+        u, w, turned = vectors[:, :count], vectors[:, count : 2 * count], vectors[:, 2 * count : turning]
         by_u, by_w = (self._form @ w[..., None])[..., 0], (self._form.swapaxes(1, 2) @ u[..., None])[..., 0]
         found = np.sum(u * by_u, axis=2)
-        if np.any(self._roots):
-            length = np.sqrt(found[:, self._roots])
-            found[:, self._roots] = length
-            axis = np.eye(u.shape[2])[0]  # of places that coincide
-            safe = np.where(length > 0, length, 1.0)[..., None]
-            by_u[:, self._roots] = np.where(length[..., None] > 0, u[:, self._roots] / safe, axis)
-            by_w[:, self._roots] = 0.0
         values = np.zeros((lanes, self.count))
         if len({*self._products.tolist()}) == len(self._products):
             values[:, self._products] = found
@@ -90,7 +82,15 @@ class TermValues:
             values = values + (self._factors * (x if self._counted else np.arctan2(y, x))) @ self._angled
             slope = np.stack([np.ones_like(x), 0.0 * y]) if self._counted else np.stack([-y, x]) / (x * x + y * y)
             by_turned[..., 0], by_turned[..., 1] = self._factors * slope
-        by_vector = np.concatenate([by_u, by_w, by_turned], axis=1)
+        gaps = vectors[:, turning:]
+        by_gap = np.zeros_like(gaps)
+        if len(self._rooted):
+            length = np.sqrt(np.sum(gaps * gaps, axis=2))
+            values = values + (self._scales * length) @ self._rooted
+            axis = np.eye(gaps.shape[2])[0]  # of places that coincide
+            safe = np.where(length > 0, length, 1.0)[..., None]
+            by_gap = self._scales[..., None] * np.where(length[..., None] > 0, gaps / safe, axis)
+        by_vector = np.concatenate([by_u, by_w, by_turned, by_gap], axis=1)
         return values + self.offset, np.sum(by_vector[:, self._numbers] * self._coefficients, axis=2)
 
     def jacobian(self, q: Array) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
@@ -26,7 +26,7 @@ class Term:
     form: (d, d). lengths: the power of a length that it is measured in. angles: factors and unit vectors whose angles
     [rad] are counted, in space in coordinates whose third axis is that which they turn about. period: of a term with
     angles, multiples of which make no difference. of_start: whether the constant is such that it vanishes at the start.
-    further: pairs of vectors whose scalar products add
+    further: pairs of vectors whose scalar products add. roots: factors and vectors of separate bodies whose lengths add
     """
 
     name: str
@@ -40,6 +40,7 @@ class Term:
     period: Number = 1.0
     of_start: bool = False
     further: tuple[tuple[Affine, Affine], ...] = ()
+    roots: tuple[tuple[Number, Affine], ...] = ()
 
     @property
     def pairs(self) -> list[tuple[Affine, Affine, Array]]:
@@ -118,23 +119,28 @@ class Terms:
         """u x w + drive(t) = 0 of two vectors of the plane, measured in m to the power of `lengths`."""
         self.held.append(Term(name, u, w, plane.CROSS, 0.0, drive, lengths))
 
-    def mesh(
+    def sum(
         self,
         name: str,
-        angles: Iterable[tuple[Number, Affine]],
-        period: Number,
-        product: tuple[Affine, Affine] | None = None,
+        pairs: Sequence[tuple[Affine, Affine]],
+        *,
+        angles: Iterable[tuple[Number, Affine]] = (),
+        period: Number = 1.0,
+        roots: Iterable[tuple[Number, Affine]] = (),
         lengths: int = 0,
-        further: Iterable[tuple[Affine, Affine]] = (),
+        drive: Composed | None = None,
+        of_start: bool = True,
     ) -> None:
-        """u . w + sum of factor * angle of unit vector stays as at the start, but for multiples of the period.
+        """Sum of scalar products u . w, factor * angle of unit vector and factor * length, + drive(t) = 0.
 
-        product: u and w, if any; further: more of them; lengths: the power of a length that it is measured in
+        Multiples of the period of sums with angles make no difference. lengths: the power of a length that it is
+        measured in; of_start: whether it stays what it is at the start
         """
-        angles, further = tuple(angles), tuple(further)
-        u, w = product or (fixed(0.0 * (*angles, *further)[0][1].constant),) * 2
+        (u, w), *further = pairs
         form = np.eye(len(u.constant))
-        self.held.append(Term(name, u, w, form, 0.0, None, lengths, angles, period, of_start=True, further=further))
+        self.held.append(
+            Term(name, u, w, form, 0.0, drive, lengths, tuple(angles), period, of_start, tuple(further), tuple(roots))
+        )
 
     def begin(self, value: Callable[[Affine], Array]) -> None:
         """Give all terms that vanish at the start their constants. value: of a vector there, (d, lanes)."""

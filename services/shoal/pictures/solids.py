@@ -11,7 +11,7 @@ import numpy as np
 from shoal.pictures.links import At
 from shoal.pictures.outline import INSIDE
 from shoal.scene import GROUND, Attachment, Body, RigidBody, Rod, Scene
-from shoal.scene.joints import Coupling, Cylindrical, Joint, Planar, Revolute, Slider, Transmission, Universal
+from shoal.scene.joints import Coupling, Cylindrical, Joint, Planar, Revolute, Slider, Universal
 from shoal.trajectory import Array
 
 _LEAST = 1e-9
@@ -117,7 +117,7 @@ class MarkedScene:
             carried = [(joint.first, joint.axis), (joint.second, joint.second_axis)]
         elif isinstance(joint, Revolute | Cylindrical | Planar | Slider) and (rigid := self._rigid(joint)):
             carried = [(rigid, joint.axis)]
-        if not carried or isinstance(joint, Coupling | Transmission):
+        if not carried or isinstance(joint, Coupling):
             return []
         place, own = self._place(joint.first), joint.direction if isinstance(joint, Slider) and not joint.axis else None
         if place is None:

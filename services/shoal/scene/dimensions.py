@@ -9,7 +9,7 @@ from pydantic import BeforeValidator
 
 from shoal.scene.record import Record
 
-SPATIAL_KINDS = ("spherical", "universal", "cylindrical", "planar", "transmission")
+SPATIAL_KINDS = ("spherical", "universal", "cylindrical", "planar")
 PLANAR_ELEMENTS = ("ancf-full", "simo-reissner", "modal")
 _Z = (0.0, 0.0, 1.0)
 Dimensions = Annotated[Literal[2, 3], BeforeValidator(lambda given: int(given) if given in ("2", "3") else given)]
@@ -33,7 +33,7 @@ def check_dimensions(scene: Any) -> None:
         _check_plane(scene, "")
         return
     for name, joint in scene.joints.items():
-        if joint.kind not in ("coupling", "transmission") and joint.first.body == joint.second.body:
+        if joint.kind != "coupling" and joint.first.body == joint.second.body:
             raise ValueError(f"joints.{name}: closes {joint.first.body!r} upon itself; that is for the plane")
     for name, load in scene.loads.items():
         for field in ("first_to", "second_to"):

@@ -166,7 +166,10 @@ def _check_call(node: ast.Call, text: str) -> None:
 
 def _check_measure(found: tuple[str, ...], node: ast.Call, count: int) -> None:
     name, *parts = found
-    if node.keywords or len(parts) != count or not all(map(_NAME.fullmatch, parts)):
+    # A name in quotes may hold anything, as those of files of others do.
+    named = [_NAME.fullmatch(part) or (part and isinstance(argument, ast.Constant) and part == argument.value)
+             for part, argument in zip(parts, node.args, strict=True)]  # fmt: skip
+    if node.keywords or len(parts) != count or not all(named):
         wanted = "the name of a part" if count == 1 else "two names"
         raise InputError(
             f"expression: {name}({', '.join(parts)}): {name} takes {wanted}, such as {name}({_SUCH[count]})"

@@ -7,6 +7,7 @@ no functions of time alone are names of signals and measures of the machine.
 from __future__ import annotations
 
 import ast
+import keyword
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -37,6 +38,12 @@ class Measure:
 
     def __str__(self) -> str:
         return f"{self.kind}({', '.join(self.names)})"
+
+    @property
+    def text(self) -> str:
+        """Return it as a scene has it: names that read like something else stand in quotes."""
+        plain = (name if name.isidentifier() and not keyword.iskeyword(name) else repr(name) for name in self.names)
+        return f"{self.kind}({', '.join(plain)})"
 
 
 _SIGNS: dict[type[ast.operator], str] = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**"}

@@ -10,7 +10,9 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import BeforeValidator, Field, model_validator
 
+from shoal.errors import InputError
 from shoal.scene.contact_law import ContactLaw
+from shoal.scene.formula import Measure, tree
 from shoal.scene.function import Function
 from shoal.scene.record import Angle, Axis, NonNegative, Positive, Record, Vector, Vector3, kinds
 
@@ -433,51 +435,70 @@ class Gear(DirectionTie, Slack):
         return Fraction(self.ratio).limit_denominator(MOST_TEETH)
 
 
-class Share(Record):
-    """The free motion of a joint, with its factor in a transmission."""
-
-    joint: str
-    """Name of a revolute joint, whose angle [rad] counts, or of a slider, whose way [m] does."""
-    factor: float = 1.0
-    """Its factor [1 or m/rad]."""
+COUPLED = ("angle", "slide", "distance", "position")
+"""Measures that a coupling may count."""
 
 
-class Transmission(Record):
-    """The sum of factor * free motion of joints stays what it is at the start: gears, belts, racks that others carry.
+class CoupledMeasure(Record):
+    """A measure of the machine, or a coordinate of a place, with its factor in a coupling."""
 
-    The free motion is that of the second body against the first. In space only.
-    """
-
-    kind: Literal["transmission"] = "transmission"
-    turned: ClassVar[tuple[str, ...]] = ()
-    terms: Annotated[tuple[Share, ...], Field(min_length=1)]
-    """Joints with their factors. The ratios of those of hinges are fractions of whole numbers up to 1000."""
-
-
-class CoupledCoordinate(Record):
-    """A coordinate of a place, with its factor in a coupling."""
-
-    at: Attachment
-    """The place."""
-    axis: Literal["x", "y", "z"]
+    of: str | None = None
+    """The measure: `angle(JOINT)` or `angle(BODY)` [rad], `slide(JOINT)`, `distance(P, Q)` or `position(P, x)` [m]."""
+    at: Attachment | None = None
+    """In place of a measure, a place whose coordinate counts."""
+    axis: Literal["x", "y", "z"] | None = None
     """The coordinate."""
     factor: float = 1.0
-    """Its factor [1]."""
+    """Its factor [1; of an angle beside lengths m/rad]."""
+
+    @property
+    def measure(self) -> Measure | None:
+        """Return the measure; None of a coordinate of a place."""
+        return None if self.of is None else measure_of(self.of)
+
+    @model_validator(mode="after")
+    def _one_measure(self) -> CoupledMeasure:
+        if (self.of is None) == (self.at is None) or (self.at is None) != (self.axis is None):
+            raise ValueError("a term is `of` a measure, or `at` a place along an `axis`")
+        if self.of is not None:
+            measure_of(self.of)
+        return self
+
+
+def measure_of(text: str) -> Measure:
+    """Return the measure that a text names. Raises ValueError."""
+    try:
+        found = tree(text)
+    except InputError as error:
+        raise ValueError(f"of: {error}") from None
+    if not isinstance(found, Measure) or found.kind not in COUPLED:
+        raise ValueError(f"of: one of angle, slide, distance and position of a machine, found {text[:60]!r}")
+    return found
 
 
 class Coupling(Slack):
-    """The sum of factor * coordinate is a function of time, or free by its backlash [m] about that of the start."""
+    """The sum of factor * measure is a function of time, or what it is at the start: racks, screws, differentials.
+
+    Angles count all turns. With backlash it is free about its value at the start.
+    """
 
     kind: Literal["coupling"] = "coupling"
     turned: ClassVar[tuple[str, ...]] = ()
-    terms: Annotated[tuple[CoupledCoordinate, ...], Field(min_length=1)]
-    """Coordinates with their factors."""
-    value: Function = Function(number=0.0)
-    """The sum [m] as a function of time."""
+    terms: Annotated[tuple[CoupledMeasure, ...], Field(min_length=1)]
+    """Measures with their factors."""
+    value: Function | None = None
+    """The sum [m or rad] as a function of time; by default 0 of coordinates of places, else that of the start."""
+
+    @property
+    def sum(self) -> Function | None:
+        """Return the sum as a function of time; None where it is that of the start."""
+        if self.value is None and all(term.of is None for term in self.terms):
+            return Function(number=0.0)
+        return self.value
 
     @model_validator(mode="after")
     def _slack_about_start(self) -> Coupling:
-        if self.backlash is not None and self.value.number != 0.0:
+        if self.backlash is not None and self.value is not None and self.value.number != 0.0:
             raise ValueError("value: with backlash the sum is free about its value at the start; leave one of them out")
         return self
 
@@ -496,7 +517,6 @@ Joint = Annotated[
         | Weld
         | Slider
         | Distance
-        | Transmission
         | Parallel
         | Perpendicular
         | DrivenAngle

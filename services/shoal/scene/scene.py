@@ -39,7 +39,7 @@ from shoal.scene.joints import GROUND, Attachment, Joint, MovingPoint, Universal
 from shoal.scene.loads import DistributedForce, Force, Load
 from shoal.scene.paths import key, parts, shared, unknown, unwrapped, with_lanes
 from shoal.scene.record import Record, Vector, one_line
-from shoal.scene.signals import State, check_signals
+from shoal.scene.signals import State, check_coupling, check_signals
 from shoal.scene.solids import ModalBody
 from shoal.scene.solver import Solver
 
@@ -133,15 +133,6 @@ class Scene(Record):
         ]
         return f"Scene({self.name}: {'; '.join(part for part in parts if part)})"
 
-    def _check_shares(self, name: str, transmission: joint_types.Transmission) -> None:
-        able = [one for one, joint in self.joints.items() if joint.kind in ("revolute", "slider")]
-        for number, share in enumerate(transmission.terms):
-            if share.joint not in able:
-                raise ValueError(
-                    f"joints.{name}.terms.{number}.joint: must be a revolute joint or a slider of this scene, "
-                    f"{', '.join(able)[:200]}; found {share.joint!r}"
-                )
-
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         if self.starts_at_rest:
@@ -156,9 +147,9 @@ class Scene(Record):
         for name, joint in self.joints.items():
             for field, side in joint_types.sides(joint).items():
                 self._check_attachment(f"joints.{name}.{field}", side)
-            if isinstance(joint, joint_types.Transmission):
-                self._check_shares(name, joint)
-            elif not isinstance(joint, joint_types.Coupling) and joint.first.body == joint.second.body:
+            if isinstance(joint, joint_types.Coupling):
+                check_coupling(self, name, joint)
+            elif joint.first.body == joint.second.body:
                 body = self.bodies.get(joint.first.body)
                 if body is None or body.element in FRAMED:
                     raise ValueError(

@@ -16,7 +16,7 @@ from shoal.scene import expression, formula
 from shoal.scene.ended import End
 from shoal.scene.formula import MEASURES, Measure, Node, leaves
 from shoal.scene.function import Function, SignalFunction
-from shoal.scene.joints import GROUND, Attachment, Cylindrical, DrivenAngle, Revolute, Slider
+from shoal.scene.joints import GROUND, Attachment, Coupling, Cylindrical, DrivenAngle, Revolute, Slider
 from shoal.scene.record import Positive, Record
 
 TAKEN = {"t", "pi", "e", *expression.ONE, *expression.MANY, *MEASURES}
@@ -78,6 +78,20 @@ def check_signals(scene: Any) -> None:
                 f"signals.{name}: too long where signals are written out; at most {_MOST} operations, nested at most "
                 f"{_DEEPEST} deep"
             )
+
+
+def check_coupling(scene: Any, name: str, joint: Coupling) -> None:
+    """Raises ValueError for measures of a coupling that a scene does not have."""
+    for number, term in enumerate(joint.terms):
+        if term.measure is not None:
+            _check_measure(scene, f"joints.{name}.terms.{number}.of", term.measure)
+    if scene.dimensions == 3 and joint.value is not None:
+        for number, term in enumerate(joint.terms):
+            if term.measure is not None and term.measure.kind == "angle":
+                raise ValueError(
+                    f"joints.{name}.value: in space a sum with an angle (terms.{number}) is that of the start; leave "
+                    "it out, and drive an angle by a driven-angle"
+                )
 
 
 def check_leaves(scene: Any, where: str, function: SignalFunction) -> None:

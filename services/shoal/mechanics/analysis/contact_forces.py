@@ -16,9 +16,10 @@ from shoal.mechanics.joints import conditions
 from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import Array, Flags
 from shoal.mechanics.reach import span
-from shoal.scene import Attachment, Contact, Coupling, Slider
+from shoal.mechanics.sums import place_of_force
+from shoal.scene import Contact, Slider
 from shoal.scene.clearances import contacts_of
-from shoal.scene.joints import places, tightened
+from shoal.scene.joints import tightened
 
 TOUCHING = 1e-9
 """Gaps below this part of the machine's size, and accelerations below it of all that make them up, are none."""
@@ -101,7 +102,7 @@ def _in_joint(motion: FreeMotion, gaps: Gaps, number: int, path: str, here: Pres
     force, none = here.force[:, 1 if rubs else 0], np.zeros(len(here.force))
     told = _acts(force) & ~(rubs & (here.mode == SLIP))
     return ContactForce(
-        unit.times(sign * force), motion.place(_second(joint)), none if rubs else force,
+        unit.times(sign * force), motion.place(place_of_force(motion.scene, joint)), none if rubs else force,
         np.stack([force if rubs else none], axis=1), here.mode, sign, (told[:, None] * unit.gradient,),
     )  # fmt: skip
 
@@ -112,7 +113,7 @@ def _unit(motion: FreeMotion, name: str, joint: Any, field: str) -> tuple[Compon
         tight = tightened(joint)
         (condition,) = conditions(tight, motion.dimensions)
         (unit,) = of_condition(motion, name, condition)
-        return unit._replace(name="backlash"), condition.most / condition.teeth[0] if joint.kind == "gear" else 1.0
+        return unit._replace(name="backlash"), 1.0 / condition.scale
     if field == "keeps":
         way = motion.gap(joint)
         return pair(motion, name, "axial", joint, way / np.linalg.norm(way, axis=1, keepdims=True), None), 1.0
@@ -121,10 +122,6 @@ def _unit(motion: FreeMotion, name: str, joint: Any, field: str) -> tuple[Compon
         along = motion.line(joint.first, joint.direction if joint.axis is None else joint.axis)
         return pair(motion, name, label, joint, along, None), 1.0
     return pair(motion, name, label, joint, None, motion.pin(joint)), 1.0
-
-
-def _second(joint: Any) -> Attachment:
-    return places(joint)[0] if isinstance(joint, Coupling) else joint.second
 
 
 def _between(
@@ -148,7 +145,7 @@ def _between(
     open_ += [one * ~slips[:, None] for one in gradients[1:]] * bool(gaps.rubs[number])
     component = Component(name, CONTACT, gradient, whole, np.zeros((len(at), motion.turn_axes)))
     if section == "joints":
-        side = _second(motion.scene.joints[name])
+        side = place_of_force(motion.scene, motion.scene.joints[name])
         push = whole if contact.first.body == side.body else -whole
         torque = _moment(motion, at - motion.place(side), push)
         component = Component(name, "play", gradient, push, torque)

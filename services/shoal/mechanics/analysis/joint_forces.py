@@ -16,9 +16,10 @@ from shoal.mechanics.affine import Affine
 from shoal.mechanics.analysis.free_motion import FreeMotion
 from shoal.mechanics.assembly.phases import free_motion
 from shoal.mechanics.frames import BeamFrame, Frame, ModalFrame, PointFrame
-from shoal.mechanics.joints import Geared, Sum, Transmitted
 from shoal.mechanics.numerics.tile import Array, Index
+from shoal.mechanics.sums import BodyAngle, Measured, Sum, angle_sides, axis_of_angle, coordinate, ends, line_of
 from shoal.scene import Revolute, Slider
+from shoal.scene.formula import Measure
 
 
 class Component(NamedTuple):
@@ -52,12 +53,8 @@ def components(motion: FreeMotion) -> list[Component]:
 
 def of_condition(motion: FreeMotion, name: str, condition: Any) -> Iterator[Component]:
     """Yield the unknowns of one condition of a joint."""
-    if isinstance(condition, Geared):
-        yield _geared(motion, name, condition)
-    elif isinstance(condition, Transmitted):
-        yield _transmitted(motion, name, condition)
-    elif isinstance(condition, Sum):
-        yield _coupled(motion, name, condition)
+    if isinstance(condition, Sum):
+        yield _summed(motion, name, condition)
     else:
         pushes = condition.pushes(motion)
         twists = _resisted(motion, condition, condition.twists(motion))
@@ -101,40 +98,37 @@ def _resisted(motion: FreeMotion, condition: Any, twists: Mapping[str, Array]) -
     return {("mx", "my", "mz")[k] if count == 3 else f"m{k + 1}": axes[:, k] for k in range(count)}
 
 
-def _geared(motion: FreeMotion, joint: str, condition: Geared) -> Component:
-    """Return torques in proportion to the teeth."""
-    gradient = np.zeros((len(motion.at), motion.bodies.unknowns))
-    torques = []
-    for side, axis, factor in zip(condition.sides, condition.axes, condition.factors, strict=True):
-        torques.append(factor * motion.about(side, axis))
-        gradient += _along(torques[-1], motion.turn(side))
-    return Component(joint, "torque", gradient, np.zeros((len(motion.at), motion.dimensions)), torques[0])
+def _summed(motion: FreeMotion, joint: str, condition: Sum) -> Component:
+    """Return forces along measures, and torques about the axes of angles, in proportion to their factors."""
+    units = [_measured(motion, joint, condition.unit, one).times(factor * np.ones(len(motion.at)))
+             for factor, one in condition.parts]  # fmt: skip
+    return units[0]._replace(gradient=np.sum([one.gradient for one in units], axis=0))
 
 
-def _transmitted(motion: FreeMotion, joint: str, condition: Transmitted) -> Component:
-    """Return torques about hinges and forces along sliders in proportion to their factors."""
-    units = []
-    for share in condition.shares:
-        one = motion.scene.joints[share.joint]
-        if isinstance(one, Slider):
-            along = one.direction if one.axis is None else one.axis
-            unit = pair(motion, joint, "transmitted", one, motion.line(one.first, along), None)
-        else:
-            assert isinstance(one, Revolute)
-            unit = pair(motion, joint, "transmitted", one, None, motion.pin(one))
-        units.append(unit.times(np.full(len(motion.at), share.factor)))
-    gradient = np.sum([one.gradient for one in units], axis=0)
-    return Component(joint, "transmitted", gradient, units[0].force, units[0].torque)
-
-
-def _coupled(motion: FreeMotion, joint: str, condition: Sum) -> Component:
-    """Return forces along coordinates in proportion to their factors."""
-    axes = ["xyz".index(term.axis) for term in condition.terms]
-    slopes = [motion.slope(motion.placement.point(motion.scene, term.at)) for term in condition.terms]
-    row = sum(term.factor * slope[k] for term, slope, k in zip(condition.terms, slopes, axes, strict=True))
-    force = condition.terms[0].factor * motion.axes[axes[0]]
-    gradient = np.broadcast_to(row, (len(force), motion.bodies.unknowns))
-    return Component(joint, "coupled", gradient, force, np.zeros((len(force), motion.turn_axes)))
+def _measured(motion: FreeMotion, joint: str, label: str, one: Measured) -> Component:
+    """Return a unit force along a measure."""
+    scene, none = motion.scene, np.zeros((len(motion.at), motion.dimensions))
+    no_turn = np.zeros((len(motion.at), motion.turn_axes))
+    if isinstance(one, BodyAngle):
+        torque = motion.about(one.side, one.axis)
+        return Component(joint, label, _along(torque, motion.turn(one.side)), none, torque)
+    kind = one.kind if isinstance(one, Measure) else "position"
+    if kind == "position":
+        side, axis = coordinate(scene, one)
+        slope = motion.slope(motion.placement.point(scene, side))[axis]
+        return Component(joint, label, np.broadcast_to(slope, (len(none), len(slope))), motion.axes[axis], no_turn)
+    if kind == "distance":
+        first, second = (motion.placement.point(scene, end) for end in ends(scene, one))
+        way = motion.value(second - first)
+        unit = way / np.linalg.norm(way, axis=1, keepdims=True)
+        return Component(joint, label, unit @ motion.slope(second - first), unit, no_turn)
+    if kind == "slide":
+        tie, along = line_of(scene, one)
+        return pair(motion, joint, label, tie, motion.line(tie.first, along), None)
+    assert isinstance(one, Measure)
+    sides, is_plane = angle_sides(scene, one), motion.turn_axes == 1
+    torque = motion.turns["torque"] if is_plane else motion.common_axis(*sides, axis_of_angle(scene, one))
+    return Component(joint, label, _along(torque, motion.turn(sides[1]) - motion.turn(sides[0])), none, torque)
 
 
 def rotors(motion: FreeMotion, change: Array) -> Array:

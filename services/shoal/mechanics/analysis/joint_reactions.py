@@ -40,8 +40,8 @@ from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import Array, Flags
 from shoal.mechanics.reach import span
 from shoal.mechanics.rubbing import ROUNDS, SETTLED
-from shoal.scene import Attachment, Coupling, Revolute, Scene, Slider
-from shoal.scene.joints import Transmission, places
+from shoal.mechanics.sums import place_of_force
+from shoal.scene import Revolute, Scene, Slider
 
 RANK = 1e-9
 BALANCED = 1e-6
@@ -339,7 +339,7 @@ def reactions_of(
         found[name] = JointReaction(
             name,
             joint.kind,
-            tuple(motion.place(_second(motion.scene, joint))[0].tolist()),
+            tuple(motion.place(place_of_force(motion.scene, joint))[0].tolist()),
             tuple(force),
             torque[0] if len(torque) == 1 else tuple(torque),
             {part: float(size[0]) for part, size in told.components(name).items()},
@@ -400,9 +400,3 @@ def _sharing(evaluator: Evaluator, q: Array, t: float) -> Array:
         return none
     near = nearby_freedom(evaluator, metric, freedom, q, t)
     return np.asarray(np.max(np.abs(near.dependent), axis=1, initial=0.0))
-
-
-def _second(scene: Scene, joint: Any) -> Attachment:
-    if isinstance(joint, Transmission):
-        joint = scene.joints[joint.terms[0].joint]
-    return places(joint)[0] if isinstance(joint, Coupling) else joint.second

@@ -23,6 +23,7 @@ from shoal.mechanics.numerics.tile import Array, Number, index, stacked
 from shoal.mechanics.pairs import FLAT, HOLE, PROFILE, ROUND, Pairs
 from shoal.mechanics.profiles import CORNER, SEGMENT, SIZE, Profiles, chains
 from shoal.mechanics.reach import span
+from shoal.mechanics.sums import BodyAngle, Measured, angle_sides, axis_of_angle, coordinate, ends, line_of
 from shoal.scene import (
     GROUND,
     Attachment,
@@ -37,7 +38,8 @@ from shoal.scene import (
     Slider,
 )
 from shoal.scene.clearances import contacts_of
-from shoal.scene.joints import tightened
+from shoal.scene.formula import Measure
+from shoal.scene.joints import Z, tightened
 from shoal.scene.polygons import corners_of, distance, is_concave
 
 RESOLUTION = 1e-12
@@ -198,31 +200,55 @@ class Contacts(Measures):
         assert joint.backlash is not None
         for sign in (LOWER, UPPER):
             first = len(self.kinds)
-            factors = self._turns(name, joint) if isinstance(joint, Gear) else self._coordinates(name, joint)
+            factors = self._counted(name, joint)
             self.laws[LAW * first + NATURAL] += -0.5 * sign * joint.backlash / factors[0]
             weights = [sign * factor for factor in factors]
             self._add(f"joints.{name}.backlash", LIMIT, first, weights, restitution=joint.restitution)
 
-    def _turns(self, name: str, joint: Gear) -> list[Number]:
-        """Measure the angles of gears from where they start; return their factors, 1 for the second body."""
+    def _counted(self, name: str, joint: Gear | Coupling) -> list[Number]:
+        """Measure what a gear or a coupling counts from where it starts; return the factors."""
         (condition,) = conditions(tightened(joint), self.scene.dimensions)
-        ground, factors = Attachment(body=GROUND, point=(0.0, 0.0)), []
-        for teeth, side, axis in zip(condition.teeth, condition.sides, condition.axes, strict=True):
-            if teeth and side.body != GROUND:
-                self.placement.angle(name, side, axis)  # refuses axes in space that move
-                self._angle(name, ground, side, ElementForceLaw(), axis)
-                self.laws[-LAW + NATURAL] = self.angles[-1]
-                factors.append(teeth / condition.teeth[0])
+        factors = []
+        for factor, one in condition.parts:
+            if np.any(factor) and self._count(name, one):
+                factors.append(factor / condition.scale)
         return factors
 
-    def _coordinates(self, name: str, joint: Coupling) -> list[Number]:
-        """Measure the coordinates of a coupling from where they start; return their factors."""
-        axes = np.eye(self.scene.dimensions)[..., None]
-        for term in joint.terms:
-            point, axis = self.placement.point(self.scene, term.at), axes["xyz".index(term.axis)]
-            begin = sum(self.placement.start_of(point)[0] * axis)
-            self._measure(name, PLACE, [fixed(0.0 * axis), point, fixed(axis)], ElementForceLaw(natural=begin), 0.0)
-        return [term.factor for term in joint.terms]
+    def _count(self, name: str, one: Measured) -> bool:
+        """Add a measure of a sum, from where it starts; return whether there is one, as the ground has no angle."""
+        scene, law = self.scene, ElementForceLaw()
+        if isinstance(one, BodyAngle):
+            if one.side.body == GROUND:
+                return False
+            self.placement.angle(name, one.side, one.axis)  # refuses axes in space that move
+            self._angle(name, Attachment(body=GROUND, point=(0.0, 0.0)), one.side, law, one.axis)
+            begin = self.angles[-1]
+        elif isinstance(one, Measure) and one.kind == "angle":
+            self._angle(name, *angle_sides(scene, one), law, axis_of_angle(scene, one) or Z)
+            begin = self.angles[-1]
+        elif isinstance(one, Measure) and one.kind == "distance":
+            points = [self.placement.point(scene, end) for end in ends(scene, one)]
+            self._measure(name, DISTANCE, points, law, 0.0)
+            first, second = (self.placement.start_of(point)[0] for point in points)
+            begin = np.sqrt(sum((second - first) ** 2))
+        else:
+            begin = self._along(name, one, law)
+        self.laws[-LAW + NATURAL] = begin
+        return True
+
+    def _along(self, name: str, one: Measured, law: ElementForceLaw) -> Number:
+        """Measure a slide or a coordinate; return where it starts [m]."""
+        if isinstance(one, Measure) and one.kind == "slide":
+            joint, along = line_of(self.scene, one)
+            line = self.placement.line(joint.first, along)
+            points = [self.placement.point(self.scene, side) for side in (joint.first, joint.second)]
+        else:
+            side, axis = coordinate(self.scene, one)
+            unit = np.eye(self.scene.dimensions)[axis][:, None]
+            line, points = fixed(unit), [fixed(0.0 * unit), self.placement.point(self.scene, side)]
+        self._measure(name, PLACE, [*points, line], law, 0.0)
+        first, second, way = (self.placement.start_of(vector)[0] for vector in (*points, line))
+        return sum((second - first) * way)
 
     def _pair(self, path: str, contact: Contact) -> None:
         """Let two surfaces touch. path: of what states the contact."""

@@ -11,12 +11,15 @@ from shoal.errors import InputError
 from shoal.mechanics import plane
 from shoal.mechanics.affine import Affine, fixed
 from shoal.mechanics.assembly.groups import JointPoint, is_stiff, kept_rotation, place_of
+from shoal.mechanics.assembly.lifted import Lifted, LiftedMeasures
 from shoal.mechanics.frames import BeamFrame, Frame
 from shoal.mechanics.joints import Along, Apart, InPlane, Meet, Turned
 from shoal.mechanics.numerics.tile import Array, Flags, Number
 from shoal.mechanics.reach import span
+from shoal.mechanics.sums import angle_sides
 from shoal.mechanics.terms import Terms
 from shoal.scene import GROUND, Attachment, Function, Scene
+from shoal.scene.formula import Measure
 
 NO_LENGTH = 1e-9
 """A distance that is none, as a part of the machine's size."""
@@ -50,7 +53,7 @@ def arm(directors: Array, place: tuple[Number, ...]) -> Array:
 
 
 @dataclass
-class Placement:
+class Placement(LiftedMeasures):
     """All unknowns with their initial values, the frame of every body, and the constraints.
 
     scene: with the start that agrees with its joints. failed: lanes that have none, (lanes,) or (1,).
@@ -69,6 +72,8 @@ class Placement:
     """Unknowns whose rates are states of the user, by the size of these."""
     phases: dict[str, Affine] = field(default_factory=dict)
     """Free motions of joints, see `phases`."""
+    lifted: list[Lifted] = field(default_factory=list)
+    """Measures with unknowns of their own."""
 
     def new_vector(self, position: Array, velocity: Array) -> Affine:
         """Add a vector of unknowns with its initial value and rate, (d, lanes) each."""
@@ -122,6 +127,11 @@ class Placement:
     def angle(self, name: str, side: Attachment, axis: Any) -> Affine:
         """Return the unit vector of a body whose angle [rad] the joint `name` counts; axis: in space, about what."""
         return self.direction(self.scene, side)
+
+    def joint_angle(self, name: str, measure: Measure) -> list[tuple[float, Affine]]:
+        """Return unit vectors whose angles add up to that of a joint or a body, with their signs."""
+        signs = zip((-1.0, 1.0), angle_sides(self.scene, measure), strict=True)
+        return [(sign, self.direction(self.scene, side)) for sign, side in signs if side.body != GROUND]
 
     def across(self, first: Attachment, direction: Any) -> list[tuple[Affine, Array]]:
         """Return vectors u and forms F with u' F w = 0 for w along a line that a body holds: one pair, in space two.

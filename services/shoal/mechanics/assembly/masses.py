@@ -9,6 +9,7 @@ import numpy as np
 from shoal.mechanics import plane
 from shoal.mechanics.affine import Affine
 from shoal.mechanics.assembly.coordinates import Placement
+from shoal.mechanics.assembly.lifted import Lifted
 from shoal.mechanics.assembly.rods import rod_axis
 from shoal.mechanics.derived import RowAllocator
 from shoal.mechanics.elements import FAMILIES, SPATIAL_FAMILIES
@@ -17,7 +18,7 @@ from shoal.mechanics.elements.unstrained import unstrained
 from shoal.mechanics.frames import BeamFrame, ModalFrame, PointFrame, RigidFrame
 from shoal.mechanics.joints import Meet, conditions
 from shoal.mechanics.numerics.tile import Array, Number
-from shoal.scene import GROUND, Body, Revolute, RigidBody, Rod, Scene, Slider
+from shoal.scene import GROUND, Body, PointMass, RigidBody, Rod, Scene
 from shoal.scene.dimensions import padded
 
 ADDED = np.array([1e-8, 1e-5])
@@ -28,9 +29,6 @@ it is the larger one, and changes a frequency of torsion by less than 1e-3.
 """
 STATE = 1e-40
 """Mass of an unknown whose rate is a state of the user: so small that its energy is none."""
-PHASE = float(np.sqrt(np.finfo(float).eps))
-"""Mass of an unknown of a joint without a rotor, per inertia of the lighter body: accelerations change by as much, and
-their round-off is eps over it."""
 Entries = dict[tuple[int, int], Number]
 
 
@@ -57,30 +55,32 @@ class Masses:
             least = min(np.min(np.asarray(body.mass)) for body in scene.bodies.values())
             _add(self.mass, [vector], [[least]])
         for name, vector in placement.phases.items():
-            _add(self.mass, [vector], [[self._of_phase(name)]])
+            rotor = getattr(scene.joints[name], "armature", 0.0)
+            if np.any(rotor):
+                _add(self.mass, [vector], [[rotor]])
+        for one in placement.lifted:
+            self._lift(one)
         for name in placement.terms.pressed:
             self._lend(name)
         for unknown in placement.states.values():
             self.mass[unknown, unknown] = STATE
 
-    def _of_phase(self, name: str) -> Number:
-        """Return the mass of the free motion of a joint: of its rotor [kg m^2 or kg], or a negligible one."""
-        joint = self.scene.joints[name]
-        assert isinstance(joint, Revolute | Slider)
-        least = np.inf
-        for side in (joint.first, joint.second):
-            body = self.scene.bodies.get(side.body)
-            if body is None:
+    def _lift(self, one: Lifted) -> None:
+        """Give unknowns of a measure a negligible mass, and an added one of a part of the lightest body's."""
+        least: Number = np.inf
+        for body in self.scene.bodies.values():
+            size = body.mass
+            if one.turns and not isinstance(body, PointMass):
+                size = _turning(body, self.scene.dimensions)
+            elif one.turns:
                 continue
-            assert isinstance(body, Rod | RigidBody)
-            if isinstance(joint, Slider):
-                size = body.mass
-            elif self.scene.dimensions == plane.DIMENSIONS:
-                size = body.inertia
-            else:
-                size = sum(row[k] for k, row in enumerate(second_moments(body)))
-            least = min(least, float(np.min(size)))
-        return np.maximum(joint.armature, PHASE * least)
+            least = np.minimum(least, np.asarray(size, dtype=float))
+        least = least * one.lever**2
+        for unknown in one.unknowns:
+            known = self.mass.get((unknown, unknown), 0.0)  # that of a rotor
+            self.mass[unknown, unknown] = np.maximum(known, THINNEST * least)
+            if np.any(known < THIN * least):
+                self.lent[unknown, unknown], self.flat = np.maximum(THIN * least - known, 0.0), True
 
     def _lend(self, name: str) -> None:
         """The place that a pin holds on the ground has its body's mass besides: it is at rest, so nothing else changes.
@@ -181,6 +181,14 @@ class Masses:
     def owners(self) -> tuple[tuple[str, ...], ...]:
         """The body of every element, by family."""
         return tuple(tuple(found.owners) for found in self.families.values())
+
+
+def _turning(body: Body, dimensions: int) -> Number:
+    """Return the least inertia of a rigid body about an axis, or the mass of a flexible one at half its length."""
+    if dimensions == plane.DIMENSIONS or body.element != "rigid":
+        return body.inertia if body.element == "rigid" else body.mass * (body.length / 2) ** 2  # type: ignore[union-attr]
+    second = second_moments(body)  # type: ignore[arg-type]
+    return sum(row[k] for k, row in enumerate(second))
 
 
 THINNEST = 1e-11

@@ -1,13 +1,14 @@
-"""Free motions of joints as unknowns: of a hinge the cosine and the sine of its angle, of a slider its way.
+"""Free motions of joints as vectors: of a hinge the cosine and the sine of its angle, of a slider its way.
 
 A rotor behind a gear of the ratio N adds N^2 J r^2 / 2 to the kinetic energy, r the rate of the joint's angle. In
 natural coordinates r is no linear form of the rates, but the vector u = (cos, sin) of the angle moves with |u'| = |r|:
-a mass N^2 J of u is exact, and the mass matrix stays constant. Two quadratic constraints define u = (a . b, d . b) by
-directions a and d of the first body, at right angles to the axis, and b of the second. Between the ground and a body
-u is linear in the coordinates, and needs no unknowns. Joints that a transmission couples have such unknowns too.
+a mass N^2 J of u is exact, and the mass matrix stays constant. Between the ground and a body u is linear in the
+coordinates, else it has unknowns (`lifted`). In space couplings count the angles of these vectors.
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 
@@ -16,23 +17,45 @@ from shoal.mechanics import plane
 from shoal.mechanics.affine import Affine, fixed
 from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.assembly.groups import is_stiff
-from shoal.scene import PointMass, Revolute, Scene, Slider
-from shoal.scene.joints import Transmission
+from shoal.mechanics.assembly.lifted import Lifted
+from shoal.scene import Coupling, PointMass, Revolute, Scene, Slider
+from shoal.scene.joints import places
 
 
 def make_phases(scene: Scene, result: Placement) -> None:
-    """Add the free motions of joints with an armature, and of those that a transmission couples. Raises InputError."""
-    coupled = {part.joint for one in scene.joints.values() if isinstance(one, Transmission) for part in one.terms}
+    """Add the free motions of joints with an armature, and of those whose angles couplings count. Raises InputError."""
     for name, joint in scene.joints.items():
-        if isinstance(joint, Revolute | Slider) and (np.any(joint.armature) or name in coupled):
+        if isinstance(joint, Revolute | Slider) and np.any(joint.armature):
             for side in (joint.first.body, joint.second.body):
-                if not is_stiff(scene, side) or isinstance(scene.bodies.get(side), PointMass):
+                if not _turns(scene, side):
                     raise InputError(f"joints.{name}.armature: acts between rigid bodies; {side} is none")
-            products = free_motion(scene, joint, result)
-            result.phases[name] = _defined(name, products, int(isinstance(joint, Slider)), result)
+            _make(scene, name, result)
+    for name, joint in scene.joints.items() if scene.dimensions == 3 else ():
+        for number, term in enumerate(joint.terms) if isinstance(joint, Coupling) else ():
+            if term.measure is not None and term.measure.kind == "angle":
+                (other,) = term.measure.names
+                for side in (side.body for side in places(scene.joints[other])):
+                    if not _turns(scene, side):
+                        raise InputError(
+                            f"joints.{name}.terms.{number}.of: in space an angle is counted between rigid bodies; "
+                            f"{side} is none"
+                        )
+                if other not in result.phases:
+                    _make(scene, other, result)
 
 
-def free_motion(scene: Scene, joint: Revolute | Slider, result: Placement) -> list[tuple[Affine, Affine]]:
+def _turns(scene: Scene, body: str) -> bool:
+    return is_stiff(scene, body) and not isinstance(scene.bodies.get(body), PointMass)
+
+
+def _make(scene: Scene, name: str, result: Placement) -> None:
+    joint, before = scene.joints[name], len(result.positions)
+    result.phases[name] = _defined(name, free_motion(scene, joint, result), int(isinstance(joint, Slider)), result)
+    if added := range(before, len(result.positions)):
+        result.lifted.append(Lifted(tuple(added), name, turns=not isinstance(joint, Slider)))
+
+
+def free_motion(scene: Scene, joint: Any, result: Placement) -> list[tuple[Affine, Affine]]:
     """Return vectors whose scalar products are cosine and sine of the angle of the second body, or its way [m]."""
     if isinstance(joint, Slider):
         along = joint.direction if scene.dimensions == plane.DIMENSIONS or joint.axis is None else joint.axis

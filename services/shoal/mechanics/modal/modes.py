@@ -19,10 +19,11 @@ import numpy as np
 
 from shoal.errors import InputError
 from shoal.mechanics import joints
-from shoal.mechanics.joints import Geared, Sum, Turned
+from shoal.mechanics.joints import Turned
 from shoal.mechanics.modal import beams
 from shoal.mechanics.modal.beams import Ends
 from shoal.mechanics.numerics.tile import Array, Number
+from shoal.mechanics.sums import Sum
 from shoal.scene import ModalBody, Rod, Scene
 
 _POINTS = 24
@@ -80,7 +81,7 @@ def held(scene: Scene, name: str) -> Ends:
         return rod.ends
     places: dict[str, bool] = {}
     for _, condition in joints.of_scene(scene):
-        if isinstance(condition, Sum | Geared):
+        if isinstance(condition, Sum):
             continue
         for side in (condition.first, condition.second):
             if side.body == name:

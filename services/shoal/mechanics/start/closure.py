@@ -121,7 +121,7 @@ class Closure:
     def __init__(self, scene: Scene, begin: Array | Poses, own: bool = True, bodies: RigidBodies | None = None) -> None:
         bodies = RigidBodies(scene) if bodies is None else bodies
         held, marks, d = bodies.terms.held, bodies.marks, scene.dimensions
-        self._terms = TermValues(held, d, bodies.lengths, counted=d == 2)
+        self._terms = TermValues(held, d, counted=d == 2)
         self.names, self._bodies = tuple(one.name for one in held), len(bodies.owners)
         self.angular = np.array([one.lengths == 0 for one in held], dtype=bool)
         self.begin, self.own = Poses.of(begin, self._bodies), own

@@ -17,8 +17,10 @@ from shoal.mechanics.joints import Turned, of_scene
 from shoal.mechanics.modal.modes import bent
 from shoal.mechanics.numerics.tile import Array, Number
 from shoal.mechanics.plane import as_complex, phasor
+from shoal.mechanics.sums import angle_sides
 from shoal.mechanics.terms import Terms
 from shoal.scene import GROUND, Attachment, Function, PointMass, Rod, Scene
+from shoal.scene.formula import Measure
 from shoal.scene.function import Composed
 
 PLACE, DIRECTION, ANGLE = range(3)
@@ -51,8 +53,8 @@ class RigidBodies:
         self._pieces: dict[tuple[str, Any], int] = {(name, None): k for k, name in enumerate(scene.bodies)}
         self.points = {name for name, body in scene.bodies.items() if isinstance(body, PointMass)}
         self.marks: list[Mark] = []
-        self.lengths, self.wrapping = list[int](), list[int]()
-        """Numbers of the terms that are lengths of vectors, and of those where whole turns make no difference."""
+        self.wrapping = list[int]()
+        """Numbers of the terms where whole turns make no difference."""
         self.of_start: dict[int, Turned | None] = {}
         """By number of the term, what keeps a value of the start: an angle may be one of two; None: just that."""
         self._known: dict[tuple[int, int], tuple[Attachment, Affine]] = {}
@@ -90,10 +92,21 @@ class RigidBodies:
 
     def keep_distance(self, name: str, gap: Affine, length: Function | None) -> None:
         """Require the length of a vector [m]; None: that of the start."""
-        self.lengths.append(len(self.terms.held))
-        if length is None:
-            self.of_start[len(self.terms.held)] = None
-        self.terms.dot(name, gap, gap, 1, drive=None if length is None else length.through("neg"))
+        drive = None if length is None else length.through("neg")
+        none = fixed(0.0 * gap.constant)
+        self.terms.sum(name, [(none, none)], roots=[(1.0, gap)], lengths=1, drive=drive, of_start=length is None)
+
+    def length(self, name: str, gap: Affine) -> None:
+        """Return nothing: lengths of separate bodies are no unknowns."""
+
+    def count(self, name: str, vector: Affine) -> Affine:
+        """Return the vector whose first component is an angle with all its turns."""
+        return vector
+
+    def joint_angle(self, name: str, measure: Measure) -> list[tuple[float, Affine]] | None:
+        """Return vectors whose angles add up to that of a joint or a body, with their signs."""
+        signs = zip((-1.0, 1.0), angle_sides(self.scene, measure), strict=True)
+        return [(sign, self.angle(name, side, None)) for sign, side in signs if side.body != GROUND]
 
     def keep_angle(self, name: str, condition: Turned) -> None:
         """Require the angle from the first direction to the second, but for whole turns; a point mass has none."""

@@ -7,7 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from shoal.errors import InputError
-from shoal.mechanics.joints import Along, Apart, JointCondition, Meet, Turned, of_scene, unknown
+from shoal.mechanics.conditions import JointCondition, unknown
+from shoal.mechanics.joints import Along, Apart, Meet, Turned, of_scene
 from shoal.mechanics.numerics.tile import Array, Number
 from shoal.mechanics.plane import as_complex, phasor
 from shoal.mechanics.start.rigid_bodies import bending_rate, lead, place_of, rate_of, value_of

@@ -17,14 +17,15 @@ from shoal.errors import InputError
 from shoal.mechanics import rotation as turns
 from shoal.mechanics.assembly.space.sections import ALIGNED
 from shoal.mechanics.fitting import start_value
-from shoal.mechanics.joints import Aligned, Along, Apart, Geared, Hinged, InPlane, Meet, Square, Turned, conditions
+from shoal.mechanics.joints import Aligned, Along, Apart, Hinged, InPlane, Meet, Square, Turned, conditions
+from shoal.mechanics.sums import Sum, period_of
 from shoal.scene import JOINT_KINDS, Attachment, Joint, Revolute, Slider
 from shoal.trajectory import Array
 
 Gap = Callable[[Array, Array], Array]
 """Residual of a condition [m or rad] at coordinates and rates (rows, unknowns), (rows,)."""
 
-SPATIAL_JOINTS = frozenset(JOINT_KINDS) - {"coupling", "transmission"}
+SPATIAL_JOINTS = frozenset(JOINT_KINDS) - {"coupling"}
 
 
 def add_joint(exu: Any, ends: SpatialEnds, name: str, joint: Joint) -> list[Gap]:
@@ -248,15 +249,19 @@ def _hinged(exu: Any, ends: SpatialEnds, where: str, one: Hinged) -> Gap:
     return lambda q, v: np.zeros(len(q))
 
 
-def _meshed(exu: Any, ends: SpatialEnds, where: str, one: Geared) -> Gap:
-    """Angles are counted from the start, so that they add up to nothing."""
-    (second, first, carrier), factors = one.sides, one.factors
+def _meshed(exu: Any, ends: SpatialEnds, where: str, one: Sum) -> Gap:
+    """Gears, whose angles are counted from the start, so that they add up to nothing."""
+    factors, turned = zip(*one.parts, strict=True)
+    second, first, carrier = (part.side for part in turned)
     if not ends.is_ground(carrier):
         raise InputError(f"{where}.carrier: engine exudyn cannot do gears on a carrier that turns; use gauss")
     require_rigid(ends, where, first, second)
-    sides, frames = (first, second), [frame_about(turns.unit(np.array(axis))) for axis in one.axes[1::-1]]
+    sides, frames = (
+        (first, second),
+        [frame_about(turns.unit(np.array(axis))) for axis in (turned[1].axis, turned[0].axis)],
+    )
     images = [ends.start_axes(side).T @ frame[:, 0] for side, frame in zip(sides, frames, strict=True)]
-    weights, period = factors[1::-1], 2 * np.pi / one.most
+    weights, period = factors[1::-1], period_of(factors) or 0.0
     toothed = [
         Toothed(ends.side(side), weight, image, frame[:, :2].T)
         for side, weight, image, frame in zip(sides, weights, images, frames, strict=True)
@@ -306,7 +311,7 @@ CONDITIONS: dict[type, Callable[[Any, SpatialEnds, str, Any], Gap]] = {
     Turned: _turned,
     Square: _square,
     Hinged: _hinged,
-    Geared: _meshed,
+    Sum: _meshed,
     Apart: _distant,
 }
 """How a condition is entered; what it returns tells how far it opens."""

@@ -18,6 +18,7 @@ from shoal.mechanics.frames import BeamFrame, RigidFrame
 from shoal.mechanics.joints import Aligned, Along, Hinged, Meet, Square, Turned, of_scene
 from shoal.mechanics.numerics.tile import Array
 from shoal.scene import GROUND, Attachment, Scene
+from shoal.scene.formula import Measure
 
 
 class SpatialPlacement(AttitudeVectors, Placement):
@@ -72,6 +73,10 @@ class SpatialPlacement(AttitudeVectors, Placement):
         if isinstance(condition, Meet):
             return not condition.held
         return isinstance(condition, Turned | Aligned) or (isinstance(condition, Along) and condition.is_fixed)
+
+    def joint_angle(self, name: str, measure: Measure) -> list[tuple[float, Affine]]:
+        """Return the unit vector whose angle is that of a joint."""
+        return [(1.0, self.phases[measure.names[0]])]
 
     def angle(self, name: str, side: Attachment, axis: Any) -> Affine:
         """Return a unit vector across an axis at rest, in coordinates whose third axis that is. Raises InputError."""

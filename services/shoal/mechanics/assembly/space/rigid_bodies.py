@@ -16,6 +16,7 @@ from shoal.mechanics.assembly.space.sections import material
 from shoal.mechanics.joints import Hinged, Turned
 from shoal.mechanics.start.rigid_bodies import DIRECTION, PLACE, Mark, RigidBodies, value_of
 from shoal.scene import GROUND, Attachment, Scene
+from shoal.scene.formula import Measure
 
 
 class SpatialBodies(AttitudeVectors, RigidBodies):
@@ -30,6 +31,9 @@ class SpatialBodies(AttitudeVectors, RigidBodies):
         if side.body == GROUND:
             return fixed(image)
         return self.marked(Mark(self.body(side), DIRECTION, image, 0.0 * image))
+
+    def joint_angle(self, name: str, measure: Measure) -> None:
+        """Return nothing: turns of separate bodies in space are not counted."""
 
     def keep_hinge(self, name: str, condition: Hinged) -> None:
         """Require an angle about an axis: near the start the sine of what it differs by."""
