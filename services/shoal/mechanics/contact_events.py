@@ -15,6 +15,7 @@ from shoal.mechanics.contact import response
 from shoal.mechanics.contact.impact import STILL, fastest
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.gaps import DRY, HIT, LIFT, PASS, RIGID, SLIDE, SLIP, STICK, STOP, is_outline
+from shoal.mechanics.integrators.dense import quintic
 from shoal.mechanics.integrators.scheme import Scheme, interpolate
 from shoal.mechanics.marched import LoopRoom
 from shoal.mechanics.model import Arrays
@@ -123,15 +124,17 @@ def first(
     kernels.look(tile, m, w, w.z, w.zdot)
     near, holding = False, False
     for at in range(count):
-        g.hit[at] = 0.0
+        g.hit[at], g.looked[at] = 0.0, 0.0
         if g.closed[at] != 0.0:
             holding = holding or g.dips[at] != 0.0 or _pulls(m, w, width, at) or _turns(m, w, width, at, taken)
             near = near or g.left[at] < 0.0
         else:
             reach = 2.0 * taken * max(abs(g.before[RATE * count + at]), abs(g.rate[at]))
-            near = near or min(g.before[at], g.value[at]) < reach
+            g.looked[at] = 1.0 if min(g.before[at], g.value[at]) < reach else 0.0
+            near = near or g.looked[at] != 0.0
     if not (near or holding):
         return NEVER
+    _look_along(m, w, width)
     for part in range(PARTS):
         left, right = part / PARTS, (part + 1) / PARTS
         _at(tile, scheme, m, w, k, t, right, taken, tolerance, holding)
@@ -143,7 +146,7 @@ def first(
                 if holding:
                     happens = happens or (g.before[FORCE * count + at] >= 0.0 and _pulls(m, w, width, at))
                     happens = happens or (g.before[MARGIN * count + at] >= 0.0 and _turns(m, w, width, at, taken))
-            else:
+            elif g.looked[at] != 0.0:
                 dips = g.before[RATE * count + at] < 0.0 and g.rate[at] > 0.0
                 # What gives way may open before the surfaces have come apart.
                 falls = m.gaps.soft[at // width] == RIGID or g.rate[at] < 0.0
@@ -156,6 +159,20 @@ def first(
             _at(tile, scheme, m, w, k, t, right, taken, tolerance, holding)
         shift(tile, m, w)
     return _met(tile, m, w, taken)  # type: ignore[no-any-return]
+
+
+@njit(cache=True, error_model="numpy")
+def _look_along(m: Arrays, w: Work, width: int) -> None:
+    """Mark the closed contacts with outlines, which may end within the step, and those that share a chain of features.
+
+    Forces of closed contacts take an acceleration, which looks at them.
+    """
+    g = w.gaps
+    for at in range(m.gaps.size * width):
+        if is_outline(m.gaps, at // width):
+            twin = m.gaps.pairs.profiles.twin[m.gaps.number[at // width]] * width
+            if g.closed[at] != 0.0 or g.looked[at + twin] != 0.0:
+                g.looked[at] = 1.0
 
 
 @njit(cache=True, error_model="numpy")
@@ -190,6 +207,7 @@ def _earliest(
         if g.hit[at] == 0.0:
             continue
         arguments = (tile, scheme, m, w, k, t)
+        g.looked[at] = 1.0
         if g.closed[at] != 0.0:
             _at(tile, scheme, m, w, k, t, right, taken, tolerance, holding)
             pulls, turns = _pulls(m, w, width, at), _turns(m, w, width, at, taken)
@@ -270,7 +288,7 @@ def _at(
     interpolate(tile, scheme, m, w, k.past, x, taken, k.q, k.v)
     if holding:
         kernels.acceleration(tile, m, w, t + x * taken, k.q, k.v, tolerance, k.a)
-    kernels.look(tile, m, w, k.q, k.v)
+    kernels.look(tile, m, w, k.q, k.v, False)
 
 
 @njit(cache=True, error_model="numpy")
@@ -286,6 +304,18 @@ def miss(tile: Tile, m: Arrays, w: Work, taken: float) -> float:
             late = -g.value[at] / g.rate[at]
             most = late if abs(late) > abs(most) else most
     return most if abs(most) < 0.5 * taken else 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def move(tile: Tile, scheme: Scheme, m: Arrays, w: Work, k: LoopRoom, taken: float, late: float) -> None:
+    """Move the end of the step of the length `taken` [s] by so much more, and look at it.
+
+    By Hermite's polynomial of degree 5 through the step, which is as exact as its end up to (late / taken)^3.
+    """
+    quintic(tile, scheme.settings, m, w, k.past, 1.0 + late / taken, taken, k.q, k.v)
+    for i in range(m.unknowns * len(tile)):
+        w.z[i], w.zdot[i] = k.q[i], k.v[i]
+    kernels.look(tile, m, w, w.z, w.zdot)
 
 
 @njit(cache=True, error_model="numpy")

@@ -292,7 +292,7 @@ def energies(tile: Tile, m: Arrays, w: Work) -> None:
     simd.store(w.energy, 3 * width, simd.load(tile, w.energy, width))
     forces.add_energy(tile, m.forces, m.functions, w.z, w.memory, w.element, w.energy, 1)
     if m.gives and width == 1:
-        function_pointers.call(m.table.look, (tile, m, w, w.z, w.zdot))
+        function_pointers.call(m.table.look, (tile, m, w, w.z, w.zdot, True))
         for contact in range(m.gaps.size):
             if m.gaps.soft[contact] != gaps.RIGID and w.gaps.closed[contact] != 0.0:
                 w.energy[1] += gaps.press(m.gaps, w.gaps, contact, 1, 0)[2]

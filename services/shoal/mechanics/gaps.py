@@ -79,19 +79,19 @@ class GapWork(NamedTuple):
     onward: where that leads to (`profiles.touch`). before: value, rate, force, margin and left at the beginning of a
     step, (5 * contacts, lanes). closed: whether the contact is closed, unclear: whether its force was not unique at any
     time, in a way that moves the machine, mode: whether it sticks or slips; hit: what event of it a step has ended at;
-    impulse: at the last event; given: friction that no normal force causes, with what joint forces allow. force:
-    multiplier by direction, of a closed contact along the normal not negative [N or N m]; near: those of the last
-    decision; dips: whether it, or the margin, was negative anywhere in the step. slip, bias: rate of each direction,
-    and its derivative for accelerations of zero. heading: direction of slip, of one tangent its sign along it, of two
-    in the axes of the ground as it was at the beginning of the step, (3 * contacts, lanes); axes: normal and tangents,
-    (9 * contacts, lanes). gradient, response: of each direction, and the acceleration by a unit force, (directions *
-    unknowns, lanes). none: the acceleration without forces, unit: a unit force, (rows, lanes). reaction: multipliers of
-    the constraints: without forces, by a unit force of each direction, and as they are, ((directions + 2) *
-    constraints, lanes). matrix, load, found, way, chosen: of one lane. pair: `pairs.describe`. order: of the last
-    impact, how far the impulses of contacts that strike one after the other would be from those at once, (lanes,). log:
-    time, contact, kind, impulse and `order` of each event of the first lane, (RECORD * LOGGED,); number: of events,
-    decisions: times at which contacts were decided on, alone: whether a lane of a tile of several comes near an event,
-    which it has to meet alone, (lanes,).
+    looked: whether it is looked at within a step; impulse: at the last event; given: friction that no normal force
+    causes, with what joint forces allow. force: multiplier by direction, of a closed contact along the normal not
+    negative [N or N m]; near: those of the last decision; dips: whether it, or the margin, was negative anywhere in the
+    step. slip, bias: rate of each direction, and its derivative for accelerations of zero. heading: direction of slip,
+    of one tangent its sign along it, of two in the axes of the ground as it was at the beginning of the step, (3 *
+    contacts, lanes); axes: normal and tangents, (9 * contacts, lanes). gradient, response: of each direction, and the
+    acceleration by a unit force, (directions * unknowns, lanes). none: the acceleration without forces, unit: a unit
+    force, (rows, lanes). reaction: multipliers of the constraints: without forces, by a unit force of each direction,
+    and as they are, ((directions + 2) * constraints, lanes). matrix, load, found, way, chosen: of one lane. pair:
+    `pairs.describe`. order: of the last impact, how far the impulses of contacts that strike one after the other would
+    be from those at once, (lanes,). log: time, contact, kind, impulse and `order` of each event of the first lane,
+    (RECORD * LOGGED,); number: of events, decisions: times at which contacts were decided on, alone: whether a lane of
+    a tile of several comes near an event, which it has to meet alone, (lanes,).
     """
 
     memory: Array
@@ -109,6 +109,7 @@ class GapWork(NamedTuple):
     unclear: Array
     mode: Array
     hit: Array
+    looked: Array
     impulse: Array
     given: Array
     force: Array
@@ -202,38 +203,52 @@ def keep(tile: Tile, gaps: Gaps, g: GapWork, at_event: bool, out: Array, first: 
 
 
 @njit(cache=True, error_model="numpy")
-def look(tile: Tile, gaps: Gaps, z: Array, zdot: Array, g: GapWork, room: Array) -> None:
-    """Values, rates, slips and margins of slip; derived rows of z and zdot must be filled. room: of 6 d + 3 rows.
+def look(tile: Tile, gaps: Gaps, z: Array, zdot: Array, g: GapWork, room: Array, every: bool) -> None:
+    """Look at every contact, or at those of which g.looked is not 0 in some lane. See `look_at`."""
+    width = len(tile)
+    for contact in range(gaps.size):
+        wanted = every
+        for lane in range(width):
+            wanted = wanted or g.looked[contact * width + lane] != 0.0
+        if wanted:
+            look_at(tile, gaps, contact, z, zdot, g, room, False)
 
-    Of pairs of surfaces axes and biases as well. Pointers.
+
+@njit(cache=True, error_model="numpy")
+def look_at(
+    tile: Tile, gaps: Gaps, contact: int, z: Array, zdot: Array, g: GapWork, room: Array, whole: bool
+) -> None:  # fmt: skip
+    """Value, rate, slip and margin of slip; derived rows of z and zdot must be filled. room: of 6 d + 3 rows.
+
+    Of pairs of surfaces axes and biases as well; those along tangents of closed contacts only, or if whole. Pointers.
     """
     width, ways = len(tile), 1 + gaps.tangents
     value = forces.value_row(gaps.measures) * width
-    for contact in range(gaps.size):
-        kind, number = gaps.kind[contact], gaps.number[contact]
-        if kind == PAIR:
+    kind, number = gaps.kind[contact], gaps.number[contact]
+    if kind == PAIR:
+        for lane in range(width):
+            directions = ways if whole or g.closed[contact * width + lane] != 0.0 else 1
+            _look_at_pair(gaps, contact, width, lane, z, zdot, g, directions)
+    else:
+        for at in range(contact * width, (contact + 1) * width):
+            g.value[at], g.rate[at] = 0.0, 0.0
+        for part in range(number, gaps.last[contact]):
+            forces.measure(tile, gaps.measures, part, z, g.memory, room)
+            forces.slip(tile, gaps.measures, part, zdot, room)
             for lane in range(width):
-                _look_at_pair(gaps, contact, width, lane, z, zdot, g)
-        else:
-            for at in range(contact * width, (contact + 1) * width):
-                g.value[at], g.rate[at] = 0.0, 0.0
-            for part in range(number, gaps.last[contact]):
-                forces.measure(tile, gaps.measures, part, z, g.memory, room)
-                forces.slip(tile, gaps.measures, part, zdot, room)
-                for lane in range(width):
-                    at, weight = contact * width + lane, gaps.weight[part * width + lane]
-                    g.value[at] += weight * room[value + lane]
-                    g.rate[at] += weight * room[value + width + lane]
-            if kind == DRY:
-                for lane in range(width):
-                    at = contact * width + lane
-                    g.value[at] -= g.anchor[at]
-                    g.slip[(contact * ways + 1) * width + lane], g.rate[at] = g.rate[at], 0.0
-                    g.axes[(9 * contact + 3) * width + lane] = 1.0
-        if gaps.rubs[contact] > 0:
+                at, weight = contact * width + lane, gaps.weight[part * width + lane]
+                g.value[at] += weight * room[value + lane]
+                g.rate[at] += weight * room[value + width + lane]
+        if kind == DRY:
             for lane in range(width):
-                if g.mode[contact * width + lane] == SLIP:
-                    g.margin[contact * width + lane] = slip_along(gaps, g, contact, width, lane)
+                at = contact * width + lane
+                g.value[at] -= g.anchor[at]
+                g.slip[(contact * ways + 1) * width + lane], g.rate[at] = g.rate[at], 0.0
+                g.axes[(9 * contact + 3) * width + lane] = 1.0
+    if gaps.rubs[contact] > 0:
+        for lane in range(width):
+            if g.mode[contact * width + lane] == SLIP:
+                g.margin[contact * width + lane] = slip_along(gaps, g, contact, width, lane)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -243,7 +258,9 @@ def is_outline(gaps: Gaps, contact: int) -> bool:
 
 
 @njit(cache=True, error_model="numpy")
-def _look_at_pair(gaps: Gaps, contact: int, width: int, lane: int, z: Array, zdot: Array, g: GapWork) -> None:
+def _look_at_pair(
+    gaps: Gaps, contact: int, width: int, lane: int, z: Array, zdot: Array, g: GapWork, directions: int
+) -> None:
     ways, rows, number = 1 + gaps.tangents, pairs.pair_rows(gaps.pairs.dimensions), gaps.number[contact]
     at = contact * width + lane
     if is_outline(gaps, contact) and g.kept[at] == 0.0:
@@ -253,11 +270,13 @@ def _look_at_pair(gaps: Gaps, contact: int, width: int, lane: int, z: Array, zdo
             other = int(g.feature[beside])
         g.feature[at] = pairs.nearest_feature(gaps.pairs, number, width, lane, z, zdot, other)
     feature, kept = int(g.feature[at]), g.kept[at] != 0.0
-    g.left[at], g.onward[at] = pairs.describe(gaps.pairs, number, width, lane, ways, z, zdot, feature, kept, g.pair)
+    g.left[at], g.onward[at] = pairs.describe(
+        gaps.pairs, number, width, lane, directions, z, zdot, feature, kept, g.pair
+    )
     g.value[contact * width + lane] = g.pair[0]
     for k in range(9):
         g.axes[(9 * contact + k) * width + lane] = g.pair[1 + k]
-    for way in range(ways):
+    for way in range(directions):
         at, end = (contact * ways + way) * width + lane, 10 + way * (rows + 2) + rows
         g.slip[at], g.bias[at] = g.pair[end], g.pair[end + 1]
     g.rate[contact * width + lane] = g.slip[contact * ways * width + lane]
@@ -301,13 +320,17 @@ def press(gaps: Gaps, g: GapWork, contact: int, width: int, lane: int) -> tuple[
 
 @njit(cache=True, error_model="numpy")
 def add_unit(tile: Tile, gaps: Gaps, contact: int, way: int, z: Array, zdot: Array, g: GapWork, room: Array) -> None:
-    """Add a unit force along one direction of a contact to g.unit, rows that forces act on, and find its bias."""
+    """Add a unit force along one direction of a contact to g.unit, rows that forces act on, and find its bias.
+
+    Of a pair in a single lane after `look_at` of the whole of it.
+    """
     width, ways, number, d = len(tile), 1 + gaps.tangents, gaps.number[contact], gaps.measures.dimensions
     if gaps.kind[contact] == PAIR:
         rows = pairs.pair_rows(d)
         begin = 10 + way * (rows + 2)
         for lane in range(width):
-            _look_at_pair(gaps, contact, width, lane, z, zdot, g)
+            if width > 1:
+                _look_at_pair(gaps, contact, width, lane, z, zdot, g, ways)
             for k in range(rows):
                 g.unit[gaps.pairs.rows[rows * number + k] * width + lane] += g.pair[begin + k]
         return

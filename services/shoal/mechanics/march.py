@@ -68,6 +68,8 @@ CHATTER = 100.0
 """So many steps in a row within one that would else be taken, each ended by a switch, are no motion (OpenModelica)."""
 AIMS = 3
 """At most so often a step is aimed at an event: its dense output is of lower order than its end."""
+ROUND_OFF = 2.0**-52
+"""Of numbers."""
 GROWTH = 4.0
 """Largest ratio of the numbers of steps until one return and until the next."""
 CREEPING = 10.0
@@ -424,7 +426,12 @@ def _advance(
                 if found <= 1.0:
                     again, aims = found * taken, 1
             elif aims <= AIMS:
-                again, aims = min(taken + events.miss(tile, m, w, taken), rest), aims + 1
+                late = min(events.miss(tile, m, w, taken), rest - taken)
+                if abs(late / taken) ** 3 > ROUND_OFF:
+                    again, aims = taken + late, aims + 1
+                elif late != 0.0:
+                    events.move(tile, scheme, m, w, k, taken, late)
+                    again, taken = taken + late, taken + late
         if first_switch != 0 and again == taken and not turns:
             power = w.power[0]  # as for contacts
             found = function_pointers.ask(first_switch, (tile, m.signals, scheme, m, w, k, now, taken))

@@ -43,8 +43,8 @@ def decide(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float) -> None:
         g.decisions[lane] += 1.0
         if g.decisions[lane] > MOST:
             _end(m, w, t, width, lane, TOO_MANY + TROUBLES * impact.struck(size, width, lane, g.hit))
-    # The forces just before the event, which its search has left at other times.
-    function_pointers.call(m.table.motion, (tile, m, w, t, w.z, w.zdot, tolerance, w.a, ACCELERATION))
+    if motion.some(tile, m, g.closed):  # the forces just before the event, which its search has left at other times
+        function_pointers.call(m.table.motion, (tile, m, w, t, w.z, w.zdot, tolerance, w.a, ACCELERATION))
     passes = _pass(m, width, w)
     for at in range(size * width):
         near = g.value[at] <= m.gaps.resolution and m.gaps.soft[at // width] == RIGID
@@ -54,10 +54,10 @@ def decide(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float) -> None:
             g.speed[at] = -g.rate[at]
         if g.hit[at] == LIFT:
             log(m, w, t, at // width, width, at % width, LIFT, 0.0)
-    _strike(tile, m, w, t, tolerance, state)
+    free = _strike(tile, m, w, t, tolerance, state)
     for _ in range(2 * size + 2):
-        _resolve(tile, m, w, t, tolerance, state)
-        again = False
+        _resolve(tile, m, w, t, tolerance, state, free)
+        again, free = False, False
         for at in range(size * width):
             g.hit[at] = 0.0
             state[at] = TOUCHES if g.closed[at] != 0.0 else APART
@@ -127,8 +127,10 @@ def _release(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float, state: 
 
 
 @njit(cache=True, error_model="numpy")
-def _strike(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float, state: Array) -> None:
-    """Let the contacts that touch strike each other, and mark those that separate.
+def _strike(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float, state: Array) -> bool:
+    """Let the contacts that touch strike each other, and mark those that separate; return whether some do.
+
+    It leaves the acceleration as `_release` does.
 
     A contact that would only hop below the resolution, v^2 / 2a, strikes without restitution: its accumulation of
     impacts ends here, with all of its impulse. One that the others throw up so little is closed.
@@ -138,7 +140,7 @@ def _strike(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float, state: A
     for lane in range(width):
         some = some or _strikes(size, width, lane, g.hit)
     if not some:
-        return
+        return False
     before, plastic = np.zeros(n * width), np.zeros(size * width)
     for i in range(n * width):
         before[i] = w.zdot[i]
@@ -176,11 +178,15 @@ def _strike(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float, state: A
             meets = g.hit[at] == HIT and m.gaps.kind[contact] != DRY and t > 0.0
             if meets or (closed[at] == 0.0 and g.impulse[at] > 0.0):
                 log(m, w, t, contact, width, lane, HIT if m.gaps.soft[contact] == RIGID else MEET, g.impulse[at])
+    return True
 
 
 @njit(cache=True, error_model="numpy")
-def _resolve(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float, state: Array) -> None:
-    """Decide which contacts that touch are closed from here on, and find the acceleration."""
+def _resolve(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float, state: Array, free: bool) -> None:
+    """Decide which contacts that touch are closed from here on, and find the acceleration.
+
+    free: whether `_release` has found that without contacts
+    """
     g, width, size = w.gaps, len(tile), m.gaps.size
     before = np.zeros(size * width)
     for lane in range(width):
@@ -191,7 +197,8 @@ def _resolve(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float, state: 
             state[at] = APART
         if g.hit[at] == SLIDE:
             _head_against_force(m, w, at // width, width, at % width)
-    _release(tile, m, w, t, tolerance, state)
+    if not free:
+        _release(tile, m, w, t, tolerance, state)
     for lane in range(width):
         if _concerns(size, width, lane, g.hit):
             outcome = _choose(tile, m, w, t, lane, state)
@@ -200,8 +207,9 @@ def _resolve(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float, state: 
             _close(tile, m, w, t, lane, before)
     for at in range(size * width * (1 + m.gaps.tangents)):
         g.force[at] = 0.0
-    motion.settle(tile, m, w, t, tolerance)
-    function_pointers.call(m.table.motion, (tile, m, w, t, w.z, w.zdot, tolerance, w.a, ACCELERATION))
+    if motion.some(tile, m, g.closed):
+        motion.settle(tile, m, w, t, tolerance)
+        function_pointers.call(m.table.motion, (tile, m, w, t, w.z, w.zdot, tolerance, w.a, ACCELERATION))
 
 
 @njit(cache=True, error_model="numpy")

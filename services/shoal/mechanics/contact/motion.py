@@ -18,7 +18,8 @@ from shoal.mechanics.rubbing import LOST, ROUNDS, SETTLED
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def _some(tile: Tile, m: Arrays, flags: Array) -> bool:
+def some(tile: Tile, m: Arrays, flags: Array) -> bool:
+    """Return whether a contact is marked in any lane."""
     found = False
     for i in range(m.gaps.size * len(tile)):
         found = found or flags[i] != 0.0
@@ -65,7 +66,7 @@ def _jam(m: Arrays, w: Work, width: int, lane: int, mode: Array) -> None:
 def accelerate(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, tolerance: float, a: Array) -> None:
     """Add what the forces of closed contacts do to an acceleration that knows none of them."""
     g, width, c, ways = w.gaps, len(tile), m.constraints.size, 1 + m.gaps.tangents
-    if not _some(tile, m, g.closed):
+    if not some(tile, m, g.closed):
         return
     response.respond(tile, m, w, t, z, zdot, tolerance, g.closed)
     for lane in range(width):
@@ -117,7 +118,7 @@ def settle(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float) -> None:
     Of the places that along the normal and of joints that stick, of the rates that along all tangents that stick.
     """
     g, width, ways = w.gaps, len(tile), 1 + m.gaps.tangents
-    if not _some(tile, m, g.closed):
+    if not some(tile, m, g.closed):
         return
     response.respond(tile, m, w, t, w.z, w.zdot, tolerance, g.closed)
     held = np.zeros(m.gaps.size)
@@ -157,17 +158,18 @@ def _is_held(tile: Tile, m: Arrays, w: Work, contact: int, lane: int, k: int, pa
 def _settle_rubbing(tile: Tile, m: Arrays, w: Work, lane: int, held: Array, part: int) -> None:
     """Find the changes along the directions that are held."""
     g, ways = w.gaps, 1 + m.gaps.tangents
-    n = m.gaps.size * ways
-    equations, right = np.zeros(n * n), np.zeros(n)
-    for contact in range(m.gaps.size):
-        first = contact * ways
-        for k in range(ways):
-            row = first + k
-            known = _is_held(tile, m, w, contact, lane, k, part)
-            if known and coulomb.is_unknown(m.gaps, contact, k, held[contact]):
-                for j in range(n):
-                    equations[row * n + j] = g.matrix[row * n + j]
-                right[row] = -g.load[row]
-            else:
-                equations[row * n + row] = 1.0
-    coulomb.solve(n, equations, right, g.found, np.zeros(0))
+    size, n = m.gaps.size * ways, 0
+    each = np.zeros(size, np.int64)
+    for row in range(size):
+        g.found[row] = 0.0
+        contact, k = row // ways, row % ways
+        if _is_held(tile, m, w, contact, lane, k, part) and coulomb.is_unknown(m.gaps, contact, k, held[contact]):
+            each[n], n = row, n + 1
+    equations, right, found = np.zeros(n * n), np.zeros(n), np.zeros(n)
+    for i in range(n):
+        right[i] = -g.load[each[i]]
+        for j in range(n):
+            equations[i * n + j] = g.matrix[each[i] * size + each[j]]
+    coulomb.solve(n, equations, right, found, np.zeros(0))
+    for i in range(n):
+        g.found[each[i]] = found[i]

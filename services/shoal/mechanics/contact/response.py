@@ -16,11 +16,16 @@ from shoal.mechanics.numerics.tile import Array, Tile
 
 
 @njit(cache=True, error_model="numpy")
-def look(tile: Tile, m: Arrays, w: Work, z: Array, zdot: Array) -> None:
-    """Values, rates and slips of all contacts at a state."""
+def look(tile: Tile, m: Arrays, w: Work, z: Array, zdot: Array, every: bool) -> None:
+    """Values, rates and slips of contacts at a state, see `gaps.look`."""
+    _derive(tile, m, z, zdot)
+    gaps.look(tile, m.gaps, z, zdot, w.gaps, w.element, every)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _derive(tile: Tile, m: Arrays, z: Array, zdot: Array) -> None:
     derive(tile, m.derived, z, m.unknowns, m.force_rows, False)
     derive(tile, m.derived, zdot, m.unknowns, m.force_rows, True)
-    gaps.look(tile, m.gaps, z, zdot, w.gaps, w.element)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -33,8 +38,8 @@ def has(g: Gaps, contact: int, way: int) -> bool:
 
 @njit(cache=True, error_model="numpy")
 def respond(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, tolerance: float, wanted: Array) -> None:
-    """Find gradients and responses of the contacts that are wanted in some lane, and look at all."""
-    look(tile, m, w, z, zdot)
+    """Look at the contacts that are wanted in some lane, and find their gradients and responses."""
+    _derive(tile, m, z, zdot)
     g, width, n, c, ways = w.gaps, len(tile), m.unknowns, m.constraints.size, 1 + m.gaps.tangents
     last = (m.gaps.size * ways + 1) * c * width
     for i in range(c * width):
@@ -49,6 +54,8 @@ def respond(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, tol
         some = False
         for lane in range(width):
             some = some or wanted[contact * width + lane] != 0.0
+        if some:
+            gaps.look_at(tile, m.gaps, contact, z, zdot, g, w.element, True)
         for way in range(ways):
             if not (some and has(m.gaps, contact, way)):
                 continue

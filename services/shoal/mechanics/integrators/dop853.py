@@ -29,7 +29,8 @@ class Dop853(NamedTuple):
     """Settings and room.
 
     slope_q, slope_v: rates and accelerations of the stages, (16 * unknowns, lanes). stage_q, stage_v, stage_a: one
-    state, (rows, lanes). begin, dense: when the last step began [s], and whether its dense stages are there.
+    state, (rows, lanes). begin, dense: when the last step began [s], and whether its dense stages are there, from which
+    the highest coefficients of its polynomials follow, part_q, part_v, (4 * unknowns, lanes).
     """
 
     rank_tolerance: float
@@ -39,6 +40,8 @@ class Dop853(NamedTuple):
     stage_q: Array
     stage_v: Array
     stage_a: Array
+    part_q: Array
+    part_v: Array
     begin: Array
     dense: Array
     evaluations: Array
@@ -58,8 +61,8 @@ FACTS = Facts(
 
 def settings(solver: Solver, model: Model, tile: Tile, lanes: slice) -> Dop853:
     """Settings for one tile of lanes."""
-    slopes, state = 16 * model.unknowns * len(tile), model.rows * len(tile)
-    sizes = (slopes, slopes, state, state, state, 1, 1, 1)
+    end, state = model.unknowns * len(tile), model.rows * len(tile)
+    sizes = (16 * end, 16 * end, state, state, state, 4 * end, 4 * end, 1, 1, 1)
     return Dop853(solver.rank_tolerance, control_room(solver, tile), *(np.zeros(size) for size in sizes))
 
 
@@ -165,21 +168,31 @@ def inside(tile: Tile, scheme: Dop853, m: Arrays, w: Work, past: Array, x: float
             instant = room.begin[0] + INSTANTS[number] * h
             kernels.acceleration(tile, m, w, instant, q_, v_, room.rank_tolerance, a_)
             _keep(tile, room, m, number, v_, a_)
+        _sum(end, slope_q, room.part_q)
+        _sum(end, slope_v, room.part_v)
     for i in range(end):
-        q[i] = w.before[i] + _dense(end, i, slope_q, w.z[i] - w.before[i], x, h)
-        v[i] = w.before[end + i] + _dense(end, i, slope_v, w.zdot[i] - w.before[end + i], x, h)
+        q[i] = w.before[i] + _dense(end, i, slope_q, room.part_q, w.z[i] - w.before[i], x, h)
+        v[i] = w.before[end + i] + _dense(end, i, slope_v, room.part_v, w.zdot[i] - w.before[end + i], x, h)
 
 
 @njit(cache=True, error_model="numpy")
-def _dense(end: int, i: int, slope: Array, change: float, x: float, h: float) -> float:
+def _sum(end: int, slope: Array, part: Array) -> None:
+    """Sum the slopes to the four highest coefficients of the dense output of every entry, over h."""
+    for k in range(4):
+        for i in range(end):
+            total: float = 0.0
+            for j in range(16):
+                total += DENSE[k, j] * slope[j * end + i]
+            part[k * end + i] = total
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _dense(end: int, i: int, slope: Array, part: Array, change: float, x: float, h: float) -> float:
     """Change of one entry up to the fraction x of the step (Hairer, Norsett, Wanner I, section II.6)."""
     first, last = h * slope[i], h * slope[STAGES * end + i]
     value: float = 0.0
     for k in range(3, -1, -1):
-        part: float = 0.0
-        for j in range(16):
-            part += DENSE[k, j] * slope[j * end + i]
-        value = (value + h * part) * (x if k % 2 == 1 else 1.0 - x)
+        value = (value + h * part[k * end + i]) * (x if k % 2 == 1 else 1.0 - x)
     value = (value + 2.0 * change - first - last) * x
     value = (value + first - change) * (1.0 - x)
     return (value + change) * x
