@@ -325,7 +325,10 @@ def reactions(asked: ReactionsRequest) -> list[Reactions]:
     from shoal.mechanics.analysis.reactions import reactions
     from shoal.mechanics.analysis.reactions_verified import verified
 
-    return (verified if asked.verify else reactions)(machine(asked), list(asked.at))
+    scene = machine(asked)
+    if max(asked.at) > (end := scene.solver.duration):
+        raise InputError(f"at: {max(asked.at):g} s is after the end of the motion, solver.duration = {end:g} s")
+    return (verified if asked.verify else reactions)(scene, list(asked.at))
 
 
 @function(Identify)

@@ -438,8 +438,6 @@ def test_what_knows_no_signals_says_so() -> None:
     scene = Scene.parse(pendulum())
     with pytest.raises(InputError, match=r"loads.motor.torque: signals and states are known in motions"):
         reactions(scene)
-    with pytest.raises(InputError, match=r"states.integral: equilibria and modes know no states"):
-        statics(Scene.parse(saturated()))
     with pytest.raises(InputError, match=r"loads.motor.torque: steady motions take no signals"):
         modes(scene.with_values({"initial.arm.rate": 1.0}))
 

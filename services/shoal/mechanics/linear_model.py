@@ -29,12 +29,13 @@ from shoal.mechanics.analysis.balance import BALANCED, Balance
 from shoal.mechanics.analysis.damped import AT_MOST, Roots, small
 from shoal.mechanics.analysis.evaluate import Evaluator, Probe
 from shoal.mechanics.analysis.freedom import Metric
+from shoal.mechanics.analysis.going_on import resting
 from shoal.mechanics.analysis.modes import is_moving, refuse_rough
 from shoal.mechanics.analysis.modes_findings import ModesStatus, status_of
 from shoal.mechanics.analysis.moving_slopes import Probed, slopes
 from shoal.mechanics.analysis.small_motions import BoundedMatrix
 from shoal.mechanics.analysis.statics import seek
-from shoal.mechanics.assembly.masses import STATE
+from shoal.mechanics.gaps import DRY
 from shoal.mechanics.machine import Machine
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
@@ -180,8 +181,6 @@ def linearize(
     """
     one_of("about", about, ABOUT)
     check(time=time)
-    if scene.states and about == "equilibrium":
-        raise InputError(f"states.{next(iter(scene.states))}: equilibria know no states yet; use about: start")
     if about == "trajectory" and not time > 0.0:
         raise InputError(f"time: a trajectory is linearized at a time after 0 s, found {time:g}")
     opened, signals = _open(scene, inputs, time)
@@ -193,7 +192,7 @@ def linearize(
     state = _state_of(scene, about, time)
     for pose in state.way:
         evaluator.remember(pose)
-    probe, count = evaluator.probe(state.q, state.v, time), len(places)
+    probe, count = evaluator.probe(state.q, state.v if state.balance is None else None, time), len(places)
     if probe.kink:
         state.remarks.append(kinds.ON_A_KINK.found("a signal is where its derivative jumps: that on one side is taken"))
     if not state.modes.shape[1]:
@@ -207,6 +206,9 @@ def linearize(
     own = list(range(2 * count + len(users), len(asked))) if outputs else chosen
     if state.balance is not None:
         a, c, poles = _at_rest(state.balance, state, probe, to, own)
+        if users:
+            units = np.array([float(one.size) for one in scene.states.values()])
+            a, c = (_in_units(part, len(to), units, rates) for part, rates in ((a, True), (c, False)))
         error = float(np.finfo(float).eps * np.linalg.cond(to)) if len(to) else 0.0
     elif chosen:
         probed = Probed(chosen, [*(count + k for k in chosen), *kept], own)
@@ -268,8 +270,9 @@ def _state_of(scene: Scene, about: str, time: float) -> _State:
         return _resting(
             balance, equilibrium.q, [*doubts, *(one for one in remarks if one.text not in equilibrium.message)]
         )
-    evaluator = Evaluator(begun(Machine.of(scene).model(time)), one_sided=True, signals=True)
-    if about == "start" and not scene.states and not is_moving(evaluator, time):
+    model = begun(Machine.of(scene).model(time))
+    evaluator = Evaluator(resting(model), one_sided=True, signals=True)
+    if about == "start" and not is_moving(evaluator, time):
         balance = Balance(evaluator, time, span(scene), sum(float(body.mass) for body in scene.bodies.values()))
         q, gap = balance.restore(evaluator.model.q0[:, 0].copy())
         if gap > CLOSED:
@@ -278,8 +281,14 @@ def _state_of(scene: Scene, about: str, time: float) -> _State:
             raise ComputationError(
                 f"{scene.name}: {', '.join(names)} touches without a force: no motion is linear there"
             )
-        if balance.residual(balance.look(q)) <= BALANCED:
+        if balance.residual(view := balance.look(q)) <= BALANCED and not balance.restless(q, view):
             return _resting(balance, q, remarks)
+    evaluator = Evaluator(model, one_sided=True, signals=True)
+    if evaluator.gaps.size and np.all(evaluator.gaps.kind == DRY):
+        raise InputError(
+            f"{evaluator.model.gap_fields[0]}: a joint that sticks has no linear model in motion or out of balance; "
+            "take `stick: smooth`, or a state at rest"
+        )
     if evaluator.model.gaps.size:
         raise InputError(f"{evaluator.model.gap_fields[0]}: linear models take one-sided constraints at rest only")
     q, v = (part[:, 0].copy() for part in (evaluator.model.q0, evaluator.model.v0))
@@ -290,8 +299,8 @@ def _state_of(scene: Scene, about: str, time: float) -> _State:
             raise ComputationError(f"{scene.name}: the motion to linearize about fails: {run.message}")
         way = run.states.q[..., 0]
         q, v = way[-1], run.states.v[-1, :, 0]
-    # Unknowns whose rates are states of the user have no mass, and no place.
-    own = np.flatnonzero(evaluator.mass.diagonal() > STATE)
+    # Unknowns whose rates are states of the user have no place.
+    own = np.setdiff1d(np.arange(len(q)), evaluator.states)
     jacobian = evaluator.at(q, v, time).jacobian
     basis = Metric(evaluator.mass[own][:, own]).freedom(jacobian[:, own]).basis
     modes = np.zeros((len(q), basis.shape[1]))
@@ -306,21 +315,31 @@ def _resting(balance: Balance, q: Array, remarks: list[Finding]) -> _State:
     view = balance.look(q)
     stiffness = balance.at_rest(q, view).matrix
     shapes = balance.spectrum_of(BoundedMatrix((stiffness + stiffness.T) / 2, abs(stiffness)), view, AT_MOST).shapes
-    if shapes.shape[1] < view.freedom.degrees:
-        text = f"it is of the lowest {shapes.shape[1]} of {view.freedom.degrees} modes"
+    if shapes.shape[1] < (degrees := view.freedom.degrees - len(balance.evaluator.states)):
+        text = f"it is of the lowest {shapes.shape[1]} of {degrees} modes"
         remarks.append(kinds.LOWEST_MODES.found(text))
     return _State(q, np.zeros_like(q), shapes, q[None], balance, remarks)
 
 
 def _at_rest(balance: Balance, state: _State, probe: Probe, to: Array, own: list[int]) -> tuple[Array, Array, Complex]:
-    """Return the rows of A of the rates, C, and the poles. to: states by modes."""
-    view = balance.look(state.q)
-    stiffness, damping = balance.at_rest(state.q, view).matrix, balance.evaluator.damping(state.q, t=balance.t)
-    moved = state.modes @ np.linalg.inv(to)
-    a = np.hstack([-to @ (state.modes.T @ (part @ moved)) for part in (stiffness, damping)])
-    c = np.hstack([part[own] @ moved for part in (probe.by_place, probe.by_rate)])
-    paired = not (balance.evaluator.follows or np.any(damping.data))
-    return a, c, _poles(small(balance, state.q, view), len(to), paired=paired)
+    """Return the rows of A of the rates and of states of the user, C, and the poles. to: states by modes."""
+    view, evaluator = balance.look(state.q), balance.evaluator
+    stiffness, damping = balance.at_rest(state.q, view).matrix.toarray(), evaluator.damping(state.q, t=balance.t)
+    moved, users = state.modes @ np.linalg.inv(to), evaluator.states
+    rows = np.vstack([to @ state.modes.T, np.eye(len(state.q))[users] / evaluator.weight])
+    a = -rows @ np.hstack([stiffness @ moved, damping @ moved, stiffness[:, users]])
+    c = np.hstack([probe.by_place[own] @ moved, probe.by_rate[own] @ moved, probe.by_rate[own][:, users]])
+    paired = not (evaluator.follows or np.any(damping.data))
+    return a, c, _poles(small(balance, state.q, view), 2 * len(to) + len(users), paired=paired)
+
+
+def _in_units(matrix: Array, n: int, sizes: Array, rates: bool) -> Array:
+    """Return A or C for states of the user in their units, from those over their sizes. rates: whether it is A."""
+    matrix = matrix.copy()
+    matrix[:, 2 * n :] /= sizes
+    if rates:
+        matrix[n:] *= sizes[:, None]
+    return matrix
 
 
 def _open(scene: Scene, inputs: Sequence[str], time: float) -> tuple[Scene, list[str]]:
@@ -409,12 +428,12 @@ def _states(slopes: Array) -> tuple[list[int], Array]:
     return chosen, found
 
 
-def _poles(roots: Roots, n: int, *, paired: bool) -> Complex:
-    """Return 2 n poles [1/s], slowest first. paired: whether each root that grows has one that decays."""
+def _poles(roots: Roots, count: int, *, paired: bool) -> Complex:
+    """Return so many poles [1/s], slowest first. paired: whether each root that grows has one that decays."""
     values = roots.values[np.abs(roots.values) > 0.0]
     found = [values, np.conj(values[values.imag > 0])]
     if paired:
         found.append(-values[values.imag == 0])
     poles = np.concatenate(found)
-    poles = np.append(poles, np.zeros(max(2 * n - len(poles), 0)))
+    poles = np.append(poles, np.zeros(max(count - len(poles), 0)))
     return np.asarray(poles[np.lexsort([-poles.imag, poles.real, np.round(np.abs(poles), 12)])])

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
 from typing import Any
 
+from shoal.errors import InputError
 from shoal.scene import expression, formula
 from shoal.scene.ended import End
 from shoal.scene.formula import MEASURES, Measure, Node, leaves
@@ -78,6 +79,17 @@ def check_signals(scene: Any) -> None:
                 f"signals.{name}: too long where signals are written out; at most {_MOST} operations, nested at most "
                 f"{_DEEPEST} deep"
             )
+    if scene.signals:
+        known = expanded(scene)
+        for where, function in signal_functions(scene):
+            try:
+                _put(_tree(function), known)
+            except InputError as error:
+                raise ValueError(_at(where, error)) from None
+
+
+def _at(where: str, error: InputError) -> str:
+    return f"{where}: {str(error).removeprefix('function: ')}"
 
 
 def check_coupling(scene: Any, name: str, joint: Coupling) -> None:
@@ -97,7 +109,11 @@ def check_coupling(scene: Any, name: str, joint: Coupling) -> None:
 def check_leaves(scene: Any, where: str, function: SignalFunction) -> None:
     """Raises ValueError for names and measures of a function that a scene does not have; where: its field."""
     known = scene.signals.keys() | scene.states.keys()
-    for leaf in _leaves(function):
+    try:
+        found = list(_leaves(function))
+    except InputError as error:
+        raise ValueError(_at(where, error)) from None
+    for leaf in found:
         if isinstance(leaf, Measure):
             _check_measure(scene, where, leaf)
         elif leaf != "t" and leaf not in known:
@@ -137,7 +153,10 @@ def expanded(scene: Any) -> dict[str, Node]:
         if not isinstance(one, SignalFunction) or one.number is not None:
             known[name] = Constant(name)
         else:
-            known[name] = Table(name) if one.table is not None else _put(_tree(one), known)
+            try:
+                known[name] = Table(name) if one.table is not None else _put(_tree(one), known)
+            except InputError as error:
+                raise ValueError(_at(f"signals.{name}", error)) from None
     return known
 
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from shoal.errors import InputError
 from shoal.mechanics.analysis.equilibrium import Equilibrium
-from shoal.mechanics.analysis.evaluate import Evaluator, require_no_states
-from shoal.mechanics.analysis.going_on import taken_up
+from shoal.mechanics.analysis.evaluate import Evaluator
+from shoal.mechanics.analysis.going_on import moving, resting, taken_up
 from shoal.mechanics.analysis.statics import statics
 from shoal.mechanics.ended import start_angles
 from shoal.mechanics.machine import Machine
@@ -36,7 +36,7 @@ def begun(model: Model, scenes: Sequence[Scene] | None = None) -> Model:
     gaps = np.stack([one.gap_angles for one in found], axis=1)
     model = replace(model, q0=places, v0=np.zeros_like(places), shared_tiles={})
     turned = np.stack([one.signal_angles for one in found], axis=1)
-    return replace(model, start_angles=angles, marker_angles=markers, gap_angles=gaps, signal_angles=turned)
+    return moving(replace(model, start_angles=angles, marker_angles=markers, gap_angles=gaps, signal_angles=turned))
 
 
 def at_start(scene: Scene, *, horizon: float = 0.0) -> Evaluator:
@@ -44,9 +44,7 @@ def at_start(scene: Scene, *, horizon: float = 0.0) -> Evaluator:
 
     Raises InputError if the scene cannot be modelled, or its start as `begun` does.
     """
-    model = begun(Machine.of(scene).model(horizon))
-    require_no_states(model)
-    return Evaluator(model, one_sided=True, signals=True)
+    return Evaluator(resting(begun(Machine.of(scene).model(horizon))), one_sided=True, signals=True)
 
 
 def _equilibrium(scene: Scene) -> Equilibrium:

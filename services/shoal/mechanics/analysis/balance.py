@@ -23,7 +23,7 @@ import scipy.linalg
 import scipy.optimize
 import scipy.sparse
 
-from shoal.mechanics.analysis.evaluate import Evaluation, Evaluator, Pressing
+from shoal.mechanics.analysis.evaluate import SIZES, Evaluation, Evaluator, Pressing
 from shoal.mechanics.analysis.freedom import Freedom, Metric
 from shoal.mechanics.analysis.lanczos import is_firm, lowest
 from shoal.mechanics.analysis.rest_contacts import RestContacts
@@ -67,6 +67,10 @@ ACTIVE = 0.03
 
 IDLE = 1e-9
 """Contacts press with more than this part of all forces, as far as round-off tells."""
+STILL = 1e-9
+"""States that change by less than this part of their size in a second rest, whatever they depend on."""
+GROWN = 1e9
+"""A state that has become so many times its size grows for ever."""
 TOUCHING = 1e-9
 """Gaps below this part of the machine's size touch at an equilibrium, whose corrections are below it."""
 
@@ -88,9 +92,15 @@ class View(NamedTuple):
 
     @property
     def basis(self) -> Array:
-        """The basis Z of the free directions of a machine that has one, see `metric_of`."""
+        """The basis Z of the free directions of a machine that has one, see `metric_of`; states are the last ones."""
         assert isinstance(self.freedom, Freedom)
         return self.freedom.basis
+
+    @property
+    def motions(self) -> Array:
+        """The same without states of the user."""
+        assert isinstance(self.freedom, Freedom)
+        return self.freedom.motions
 
 
 class Balance:
@@ -109,6 +119,16 @@ class Balance:
         q = evaluator.model.q0[:, 0]
         stiff = abs(evaluator.stiffness(q, t, load=0.0)) @ np.abs(q)
         self._least = STRAINED * self.metric.size(stiff)
+        self.learn(q)
+
+    def learn(self, q: Array) -> None:
+        """Let forces be small beside those by which loads that follow answer a displacement at q."""
+        if self.evaluator.follows:
+            freedom = self.metric.freedom(self.evaluator.at(q, t=self.t).jacobian)
+            assert isinstance(freedom, Freedom)
+            ways = freedom.motions
+            stiff = float(np.linalg.norm(ways.T @ (self.evaluator.stiffness(q, self.t) @ ways)))
+            self._least = max(self._least, STRAINED * self.unit * stiff)
 
     def look(self, q: Array, load: float = 1.0) -> View:
         """Forces, free directions and multipliers at q."""
@@ -187,6 +207,14 @@ class Balance:
         bent = self.contacts.curvature(q, np.array(self.closed), view.multipliers[count:])
         return scipy.sparse.csc_array(found + bent)
 
+    def holding(self, stiffness: scipy.sparse.csc_array) -> scipy.sparse.csc_array:
+        """Return a stiffness that holds those states that act on nothing and are rates of motions, as a work done."""
+        own = np.zeros(stiffness.shape[0])
+        for k in self.evaluator.states:
+            idle = not (stiffness[[k]].count_nonzero() or stiffness[:, [k]].count_nonzero())
+            own[k] = self.evaluator.weight if idle else 0.0
+        return scipy.sparse.csc_array(stiffness + scipy.sparse.diags_array(own)) if np.any(own) else stiffness
+
     def tangent(self, q: Array, view: View, load: float = 1.0) -> BoundedMatrix:
         """The same with the bound of its round-off."""
         loose = self.evaluator.stiffness(q, self.t, load=load)
@@ -220,19 +248,49 @@ class Balance:
         parts = parts_of(self.evaluator.mass, view.evaluation.jacobian)
         if isinstance(view.freedom, SparseFreedom):
             return lowest(view.freedom, stiffness, self.evaluator.mass, parts, least)
-        return spectrum(stiffness, view.basis, self.evaluator.mass, parts)
+        return spectrum(stiffness, view.motions, self.evaluator.mass, parts)
 
     def residual(self, view: View) -> float:
         """Unbalanced force over the elastic and the applied force, all in the metric of M^-1.
 
-        Where neither acts, over the force that a strain of 1e-9 would take.
+        Where neither acts, over the force that a strain of 1e-9 would take. Rates of states count in `rates`.
         """
         scale = self._scale(view)
-        left = np.hypot(self.length(view.acceleration), np.linalg.norm(view.turning))
+        left = np.hypot(self.length(self._moving(view.acceleration)), np.linalg.norm(view.turning))
         return float(left) / scale if scale > 0 else 0.0
 
+    def rates(self, view: View) -> Array:
+        """Return the rates of the states of the user [their size per second], (states,)."""
+        return np.asarray(view.acceleration[self.evaluator.states])
+
+    def restless(self, q: Array, view: View) -> dict[str, float]:
+        """Return the rates of those states that do not rest [their size per second], by name.
+
+        A state rests if the smallest change of the machine and of all states that would let its rate vanish is small.
+        """
+        states, rates = self.evaluator.states, self.rates(view)
+        if not len(states):
+            return {}
+        ways = np.linalg.norm(self.stiffness(q, view)[states] @ view.basis, axis=1)
+        off = np.abs(rates) > np.maximum(BALANCED * ways * self.unit / self.evaluator.weight, STILL)
+        return {name: float(rates[k]) for k, name in enumerate(self.evaluator.model.scene.states) if off[k]}
+
+    def _moving(self, parts: Array) -> Array:
+        """Return a displacement or a force without states."""
+        if not len(self.evaluator.states):
+            return parts
+        parts = parts.copy()
+        parts[self.evaluator.states] = 0.0
+        return parts
+
+    def _bounded(self, parts: Array, q: Array) -> Array:
+        """Return a displacement or an acceleration with those of states over these, where they are large."""
+        parts = parts.copy()
+        parts[self.evaluator.states] /= np.maximum(1.0, np.abs(q[self.evaluator.states]) / SIZES)
+        return parts
+
     def _scale(self, view: View) -> float:
-        parts = (view.evaluation.elastic, view.evaluation.force - view.evaluation.elastic)
+        parts = (view.evaluation.elastic, self._moving(view.evaluation.force - view.evaluation.elastic))
         return max(self._least, *(self.metric.size(part) for part in parts))
 
     def restore(self, q: Array) -> tuple[Array, float]:
@@ -255,7 +313,7 @@ class Balance:
 
         def correct(q: Array) -> tuple[Array, float]:
             view = self.look(q, load)
-            stiffness = self.stiffness(q, view, load)
+            stiffness = self.holding(self.stiffness(q, view, load))
             back = self._closing(view.evaluation, view.freedom)
             move = view.freedom.step(stiffness, self._unbalanced(view) - stiffness @ back)
             return back + move, self.length(move) / self.unit + float(np.max(np.abs(back), initial=0.0))
@@ -382,21 +440,21 @@ class Balance:
     def creep(
         self, q: Array, turn: Callable[[Array, Array], float], follow: Callable[[Array], None], most: int = 400
     ) -> Root[Array]:
-        """Follow the overdamped motion M dq/ds = Q to rest (pseudo-transient continuation).
-
+        """Follow the overdamped motion M dq/ds = Q, and states with it, to rest (pseudo-transient continuation).
 
         Unlike in `newton` the damping is the time step of that motion: no step goes back to where it is unstable.
         turn, follow: see `descend`
         """
         q, _ = self.restore(q)
         begin, view, slower, correction = q, self.look(q), 1.0, np.inf
+        states = self.evaluator.states
         for iteration in range(1, most + 1):
-            if self.residual(view) < SEEN**1.3:
+            if self.residual(view) < SEEN**1.3 and np.all(np.abs(self.rates(view)) < STILL):
                 return Root(q, True, iteration, correction)
-            full, basis = self.stiffness(q, view), view.basis
+            full, basis = self.holding(self.stiffness(q, view)), view.basis
             stiffness = basis.T @ (full @ basis)
             pushed = max(0.0, -2.0 * float(np.min(scipy.linalg.eigvals(stiffness).real)))
-            pull = self.length(view.acceleration) / (LONGEST * self.unit)
+            pull = self.length(self._bounded(view.acceleration, q)) / (LONGEST * self.unit)
             while True:
                 shift = max(slower * pull, pushed)
                 move = view.freedom.step(full, self._unbalanced(view), shift)
@@ -409,7 +467,7 @@ class Balance:
             q, view, slower = trial, self.look(trial), max(1.0, slower / 4.0)
             if correction < CLOSE or (correction < STALLED and self.residual(view) < SEEN):
                 return Root(q, True, iteration, correction)
-            if self.length(q - begin) > FAR * self.unit:
+            if self.length(self._bounded(q - begin, q)) > FAR * self.unit or np.any(np.abs(q[states]) > GROWN):
                 return Root(q, False, iteration, correction, FALLS)
         return Root(q, False, most, correction, f"not at rest after {most} steps")
 
@@ -465,5 +523,5 @@ def metric_of(evaluator: Evaluator) -> Metric | SparseMetric:
     The stiffness of loads that follow the motion is not symmetric, and such a machine has its whole basis.
     """
     if evaluator.model.unknowns <= LARGE or evaluator.follows:
-        return Metric(evaluator.mass)
+        return Metric(evaluator.mass, len(evaluator.states))
     return SparseMetric(evaluator.mass, evaluator.pattern)

@@ -1,5 +1,7 @@
 """Roots s of (s^2 M + s D + K) x = 0: small motions that are damped, or whose forces follow them.
 
+States of the user are unknowns without a mass: their rows of D and K are s y - g_v s x - g_x x - g_y y = 0.
+
 With the energy as norm (e = |K|^1/2 y beside the rates) the linear problem is as large as the highest frequency and
 not its square (Tisseur and Meerbergen, The quadratic eigenvalue problem, 2001), and each root is then corrected by the
 quadratic equation that its own shape obeys (Lancaster's Rayleigh quotient). Motions that nothing holds or damps are
@@ -13,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 import scipy.linalg
+import scipy.sparse
 
 from shoal.mechanics.analysis.balance import Balance, View
 from shoal.mechanics.analysis.small_motions import ROUND, TENSION, BoundedMatrix, Spectrum
@@ -55,8 +58,12 @@ def small(balance: Balance, q: Array, view: View, count: int = AT_MOST) -> Roots
     symmetric = stiffness._replace(matrix=(stiffness.matrix + stiffness.matrix.T) / 2) if follows else stiffness
     if not follows and not np.any(friction.data):
         return undamped(balance.spectrum_of(symmetric, view, count))
-    found = balance.spectrum_of(symmetric, view, AT_MOST)
-    return roots(stiffness, BoundedMatrix(friction, ROUND * abs(friction.copy())), found, follows=follows)
+    found, m = balance.spectrum_of(symmetric, view, AT_MOST), len(evaluator.states)
+    if m:
+        found = Spectrum(found.values, np.hstack([found.shapes[:, :AT_MOST], view.basis[:, -m:]]), found.levels)
+        own = scipy.sparse.csc_array((np.ones(m), (evaluator.states, evaluator.states)), shape=friction.shape)
+        friction = friction + evaluator.weight * own
+    return roots(stiffness, BoundedMatrix(friction, ROUND * abs(friction.copy())), found, follows=follows, states=m)
 
 
 def undamped(found: Spectrum) -> Roots:
@@ -68,11 +75,16 @@ def undamped(found: Spectrum) -> Roots:
     return Roots(values, found.shapes.astype(complex), levels).ordered()
 
 
-def roots(stiffness: BoundedMatrix, damping: BoundedMatrix, found: Spectrum, *, follows: bool) -> Roots:
-    """The roots in the modes of the symmetric part of the stiffness. follows: whether it has another part."""
-    shapes, squares, levels = found.shapes[:, :AT_MOST].copy(), found.values[:AT_MOST], found.levels[:AT_MOST]
+def roots(
+    stiffness: BoundedMatrix, damping: BoundedMatrix, found: Spectrum, *, follows: bool, states: int = 0
+) -> Roots:
+    """The roots in the modes of the symmetric part of the stiffness. follows: whether it has another part.
+
+    states: so many of the last shapes are of states of the user
+    """
+    shapes, squares, levels = found.shapes[:, : AT_MOST + states].copy(), found.values[:AT_MOST], found.levels[:AT_MOST]
     if follows:
-        free = np.zeros(len(squares), dtype=bool)
+        free = np.zeros(shapes.shape[1], dtype=bool)
         matrix = shapes.T @ (stiffness.matrix @ shapes)
     else:
         free = np.abs(squares) <= levels
@@ -85,12 +97,13 @@ def roots(stiffness: BoundedMatrix, damping: BoundedMatrix, found: Spectrum, *, 
     keep = ~free
     keep[free] = ~idle
     shapes, matrix, held = shapes[:, keep], matrix[np.ix_(keep, keep)], ~free[keep]
-    values, modes, own = _coupled(stiffness, damping, shapes, matrix, held, follows)
-    slack = np.where(idle, np.sqrt(levels[free]), levels[free] / np.maximum(np.abs(rates), 1e-300))
+    values, modes, own = _coupled(stiffness, damping, shapes, matrix, held, follows, states)
+    levels = levels[free[: len(levels)]]
+    slack = np.where(idle, np.sqrt(levels), levels / np.maximum(np.abs(rates), 1e-300))
     return Roots(
         np.append(values, np.zeros(len(slack))),
         np.hstack([shapes @ modes, zeros]),
-        np.append(own, np.minimum(slack, np.sqrt(levels[free]))),
+        np.append(own, np.minimum(slack, np.sqrt(levels))),
     ).ordered()
 
 
@@ -101,24 +114,31 @@ def _coupled(
     matrix: Array,
     held: npt.NDArray[np.bool_],
     follows: bool,
+    states: int,
 ) -> tuple[Complex, Complex, Array]:
     """Roots, their shapes in the given ones, and levels. matrix: the stiffness in the shapes, 0 but for `held`."""
     n = len(matrix)
     if not n:
         return np.zeros(0, dtype=complex), np.zeros((0, 0), dtype=complex), np.zeros(0)
-    rubbing = shapes.T @ (damping.matrix @ shapes)
+    rubbing, heavy = shapes.T @ (damping.matrix @ shapes), np.arange(n) < n - states
+    held = held & heavy
     size = np.abs(np.diag(matrix))[held]
     scale = np.sqrt(np.maximum(size, 1e-12 * np.max(size, initial=0.0) if follows else 0.0))
-    linear = np.block(
-        [[np.zeros((len(scale), len(scale))), np.diag(scale) @ np.eye(n)[held]], [-matrix[:, held] / scale, -rubbing]]
-    )
+    scale[scale == 0.0] = 1.0
+    # Unknowns: energies, the rates of masses, states; of the last two the equations.
+    rate, state = np.diag(scale) @ np.eye(n)[held], ~heavy
+    rate[:, state] = 0.0
+    column = np.where(state, matrix, rubbing)
+    linear = np.block([[np.zeros((len(scale), len(scale))), rate], [-matrix[:, held] / scale, -column]])
     if follows:
         values, left, right = scipy.linalg.eig(linear, left=True)
-        y, w = _unit(right[: len(scale)] / scale[:, None]), _unit(np.conj(left[len(scale) :]))
+        both = np.zeros((n, len(values)), dtype=complex)
+        both[held], both[state] = right[: len(scale)] / scale[:, None], right[len(scale) :][state]
+        y, w = _unit(both), _unit(np.conj(left[len(scale) :]))
     else:
         values, right = scipy.linalg.eig(linear)
         y = w = _unit(right[len(scale) :])
-    a, b, c = (np.sum(w * (part @ y), axis=0) for part in (np.eye(n), rubbing, matrix))
+    a, b, c = (np.sum(w * (part @ y), axis=0) for part in (np.diag(heavy.astype(float)), rubbing, matrix))
     noise = ROUND * float(np.linalg.norm(linear, 2))
     begun = values
     for _ in range(3):
@@ -129,7 +149,8 @@ def _coupled(
     x, z = shapes @ y, shapes @ w
     slope = np.maximum(np.abs(2 * a * values + b), 1e-300)
     rub = np.abs(values) * damping.worth(z, x)
-    pull = np.maximum(stiffness.worth(z, x), TENSION * np.max(size, initial=0.0) if follows else 0.0)
+    placed = np.linalg.norm(w[heavy], axis=0) * np.linalg.norm(y[heavy], axis=0) if states else 1.0
+    pull = np.maximum(stiffness.worth(z, x), TENSION * np.max(size, initial=0.0) * placed if follows else 0.0)
     double = np.sqrt((pull + rub) / np.maximum(np.abs(a), 1e-8))
     levels = np.where(lost, np.abs(begun), np.minimum((pull + rub) / slope, double))
     growth = levels if follows else np.where(lost, levels, np.minimum(rub / slope, double))

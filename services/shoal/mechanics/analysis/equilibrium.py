@@ -89,7 +89,8 @@ class Equilibrium(Concluded):
     @property
     def stable(self) -> bool:
         """Return whether every small displacement is pulled back."""
-        return self.status is not EquilibriumStatus.UNSTABLE and bool(np.all(np.real(self.eigenvalues) > self.levels))
+        held = bool(np.all(np.real(self.eigenvalues) > self.levels))
+        return self.ok or (self.status is EquilibriumStatus.FAILED and held)
 
     def marker(self, name: str) -> Array:
         """Position of a marker [m], (d,)."""

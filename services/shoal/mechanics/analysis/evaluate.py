@@ -2,6 +2,9 @@
 
 The equations of motion are M a = Q - C_q' lambda with C(q, t) = 0; at rest, Q(q, 0, t) = C_q' lambda. For checks,
 statics and small motions; the time loop does not come this way.
+
+A state x of the user is the rate of an unknown, times its size. Where no rates are given, at rest, that unknown is the
+state itself, and its row of Q is its rate, which the balance of forces lets vanish with all others.
 """
 
 from __future__ import annotations
@@ -19,6 +22,7 @@ from shoal.mechanics import forces, functions, plane, signals
 from shoal.mechanics.analysis import evaluations
 from shoal.mechanics.analysis.load_stiffness import driven, in_plane, in_space, of_drives
 from shoal.mechanics.applied import Applied
+from shoal.mechanics.assembly.masses import STATE
 from shoal.mechanics.closed_loop import feedback_at
 from shoal.mechanics.dynamics import derived_rows, work_space
 from shoal.mechanics.elements.families import KERNELS, lay
@@ -29,11 +33,14 @@ from shoal.mechanics.machine import Machine
 from shoal.mechanics.model import Arrays, Model, laid
 from shoal.mechanics.numerics import sparse
 from shoal.mechanics.numerics.tile import SINGLE, Array, Index
+from shoal.mechanics.reach import span
 from shoal.mechanics.tangent import Tangent, damping_at, stiffness_at, tangent_tile
 from shoal.scene import Scene
 
 Sparse = scipy.sparse.csr_array
 _LANE = slice(0, 1)
+SIZES = 100.0
+"""States of the user that change by so many of their sizes count as a machine that moves by its size."""
 
 
 @dataclass(frozen=True)
@@ -126,6 +133,7 @@ class Evaluator:
                 "yet in reactions, virtual sensors, steady motions and starts from the end of a run"
             )
         self.model, self._strikes = model, False
+        self.states = np.arange(model.unknowns - len(model.scene.states), model.unknowns)
         self._arrays = model.tile(SINGLE, slice(lane, lane + 1))
         self._room = work_space(SINGLE, self._arrays)
         self._arrays = ready(SINGLE, self._arrays, self._room)
@@ -138,6 +146,8 @@ class Evaluator:
             begun = model.signal_angles[:, lane % model.signal_angles.shape[1]]
             turned = forces.initial_memory(SINGLE, followed.measures, self._room.z, begun)
             self._room.signals[: turned.size] = turned
+            none = np.zeros(followed.torques.size)
+            self._torque_turns = forces.initial_memory(SINGLE, followed.torques, self._room.z, none)
 
     @cached_property
     def _tangent(self) -> Tangent:
@@ -145,8 +155,22 @@ class Evaluator:
 
     @cached_property
     def mass(self) -> scipy.sparse.csc_array:
-        """The mass matrix, (unknowns, unknowns)."""
-        return sparse.matrix(self._arrays.pattern, self._arrays.mass)
+        """The mass matrix, (unknowns, unknowns); with `weight` of a state of the user."""
+        return scipy.sparse.csc_array(self._raised @ sparse.matrix(self._arrays.pattern, self._arrays.mass))
+
+    @cached_property
+    def weight(self) -> float:
+        """The mass [kg m^2] by which states weigh: so many of their sizes count as the machine's size."""
+        scene = self.model.scene
+        mass = sum(float(np.max(body.mass)) for body in scene.bodies.values())
+        return mass * (span(scene) / SIZES) ** 2
+
+    @cached_property
+    def _raised(self) -> scipy.sparse.dia_array:
+        """The factor of the rows of states, whose mass is negligible in motions."""
+        factor = np.ones(self.model.unknowns)
+        factor[self.states] = self.weight / STATE if len(self.states) else 1.0
+        return scipy.sparse.diags_array(factor)
 
     @cached_property
     def pattern(self) -> scipy.sparse.csc_array:
@@ -243,6 +267,9 @@ class Evaluator:
         """Count the turns of angle forces after a move of less than half a turn to q."""
         self._enter(q, None)
         evaluations.count_turns(SINGLE, self._arrays, self._room)
+        if followed := self._arrays.followed:
+            turned = forces.initial_memory(SINGLE, followed.torques, self._room.z, self._torque_turns)
+            self._torque_turns = turned
 
     def at(self, q: Array, v: Array | None = None, t: float = 0.0, *, load: float = 1.0) -> Evaluation:
         """Look at the state q, v (default: at rest) at time t [s]; `load` scales gravity and applied loads."""
@@ -250,7 +277,7 @@ class Evaluator:
         arrays, room, n = self._loaded(load), self._room, self.model.unknowns
         held = arrays.constraints
         gap, rate, bias, entries = evaluations.look(SINGLE, arrays, room, t)
-        force = room.a[:n].copy()
+        force = self._raised @ room.a[:n]
         kinetic, strain, gravity = (float(part) for part in room.energy[:3])
         applied = self._applied(arrays, t)
         evaluations.elastic(SINGLE, arrays, room)
@@ -316,7 +343,12 @@ class Evaluator:
             tangent = self._tangent
             np.add.at(values, tangent.curvature, tangent.bend * multipliers[tangent.owner])
         found = sparse.matrix(self._tangent.pattern, values) + self._load_stiffness(arrays, t)
-        return scipy.sparse.csc_array(found + self._feedback(arrays, t, signals.BY_PLACE))
+        if not arrays.followed:
+            return scipy.sparse.csc_array(found)
+        # States stand in place of their unknowns.
+        kept = scipy.sparse.diags_array(np.isin(np.arange(self.model.unknowns), self.states).astype(float))
+        found = found + self._feedback(arrays, t, signals.BY_PLACE) + self._feedback(arrays, t, signals.BY_RATE) @ kept
+        return scipy.sparse.csc_array(found)
 
     def damping(self, q: Array, v: Array | None = None, t: float = 0.0, *, dry: bool = False) -> scipy.sparse.csc_array:
         """-dQ/dv, (unknowns, unknowns); dry: with the slope of smoothed dry friction, which is huge at rest.
@@ -332,17 +364,14 @@ class Evaluator:
         found = sparse.matrix(self._tangent.pattern, damping_at(SINGLE, arrays, self._tangent, self._room))
         if not arrays.followed:
             return found
-        return scipy.sparse.csc_array(found + self._feedback(arrays, t, signals.BY_RATE))
+        kept = scipy.sparse.diags_array((~np.isin(np.arange(self.model.unknowns), self.states)).astype(float))
+        return scipy.sparse.csc_array(found + self._feedback(arrays, t, signals.BY_RATE) @ kept)
 
     def _feedback(self, arrays: Arrays, t: float, by: int) -> scipy.sparse.csc_array:
         """-dQ/dq or -dQ/dv by the signals that loads follow, at the state that was entered."""
-        n = self.model.unknowns
-        if not arrays.followed:
-            return scipy.sparse.csc_array((n, n))
-        blocks = feedback_at(arrays, self._room, t)
-        return scipy.sparse.csc_array(
-            -scipy.sparse.csc_array(blocks[:, signals.FORCE, :n].T) @ scipy.sparse.csr_array(blocks[:, by, :n])
-        )
+        n, blocks = self.model.unknowns, feedback_at(arrays, self._room, t)
+        force = self._raised @ scipy.sparse.csc_array(blocks[:, signals.FORCE, :n].T)
+        return scipy.sparse.csc_array(-force @ scipy.sparse.csr_array(blocks[:, by, :n]))
 
     def probe(self, q: Array, v: Array | None = None, t: float = 0.0) -> Probe:
         """Look at the formulas of the model that are probed, and at how signals that are numbers act on it."""
@@ -356,7 +385,7 @@ class Evaluator:
             blocks[probed, signals.BY_PLACE],
             blocks[probed, signals.BY_RATE],
             by_constants[probed],
-            blocks[:, signals.FORCE].T @ by_constants,
+            self._raised @ (blocks[:, signals.FORCE].T @ by_constants),
             signals.on_a_kink(followed, own),
         )
 
@@ -372,17 +401,22 @@ class Evaluator:
 
     @property
     def follows(self) -> bool:
-        """Return whether a load turns with a body, or a torque in space does not, or a load follows signals.
+        """Return whether a load turns with a body, or a torque in space does not, or a load follows the motion.
 
-        Then there is no potential.
+        Then, and with states of the user, there is no potential.
         """
-        applied = self._arrays.applied
-        return bool(self._arrays.followed) or applied.following + applied.turning + applied.twisting > 0
+        followed = self._arrays.followed
+        loads = [self._arrays.applied, followed.applied] if followed else [self._arrays.applied]
+        turns = any(one.following + one.turning + one.twisting > 0 for one in loads)
+        measured = bool(followed) and followed.measures.size + followed.positions + followed.velocities > 0
+        return turns or measured or len(self.states) > 0
 
     def _enter(self, q: Array, v: Array | None) -> None:
         n = self.model.unknowns
         self._room.z[:n] = q
         self._room.zdot[:n] = 0.0 if v is None else v
+        if v is None:
+            self._room.zdot[self.states] = self._room.z[self.states]
         if self.model.constraints.size == 0 and self.model.forces.size == 0:
             self._room.power[:] = 0.0
 
@@ -396,7 +430,7 @@ class Evaluator:
         return self._changed(
             weight=arrays.weight * load,
             forces=arrays.forces._replace(law=law),
-            **_scaled(arrays, load),
+            **_scaled(arrays, load, self.states),
         )
 
     def _only(self, body: str, number: int | None = None) -> Arrays:
@@ -459,7 +493,20 @@ class Evaluator:
         total = -float(np.sum(applied.coefficient * strength * z[applied.row])) if applied.fixed else 0.0
         for k, size in self._drives(arrays, t):
             total -= size * driven(arrays, z, k, self._room.memory[k])
+        if followed := arrays.followed:  # by signals that are numbers
+            feedback_at(arrays, self._room, t)
+            register, loads = signals.register(followed, self._room.signals), followed.applied
+            if loads.fixed:
+                total -= float(np.sum(loads.coefficient * register[loads.fixed_function] * z[loads.row]))
+            for k, size in enumerate(self._torques(arrays, register)):
+                total -= size * driven(arrays._replace(forces=followed.torques), z, k, self._torque_turns[k])
         return total
+
+    @staticmethod
+    def _torques(arrays: Arrays, register: Array) -> list[float]:
+        """Torques of the plane [N m] that follow signals."""
+        torques = arrays.followed.torques
+        return list(map(float, register[torques.drive] * torques.law[forces.AMPLITUDE :: forces.LAW]))
 
     def _load_stiffness(self, arrays: Arrays, t: float) -> scipy.sparse.csc_array:
         """-dQ/dq of motors, of forces that turn with a body and of torques."""
@@ -474,10 +521,9 @@ class Evaluator:
             feedback_at(arrays, self._room, t)
             register = signals.register(followed, self._room.signals)
             acting = arrays._replace(applied=followed.applied, forces=followed.torques)
-            torques = register[followed.torques.drive] * followed.torques.law[forces.AMPLITUDE :: forces.LAW]
             parts += [
                 *following(acting, z, lambda numbers: register[numbers]),
-                *of_drives(acting, z, list(enumerate(torques.tolist()))),
+                *of_drives(acting, z, list(enumerate(self._torques(arrays, register)))),
             ]
         if not parts:
             return scipy.sparse.csc_array((n, n))
@@ -489,26 +535,26 @@ class Evaluator:
         return scipy.sparse.csc_array(self.expansion.T @ block @ self.expansion)
 
 
-def require_no_states(model: Model) -> None:
-    """Raises InputError for states of the user, which are no coordinates that come to rest with the machine."""
-    if model.scene.states:
-        raise InputError(f"states.{next(iter(model.scene.states))}: equilibria and modes know no states yet")
+def _scaled(arrays: Arrays, load: float, states: Index | None = None) -> dict[str, Any]:
+    """Return the parts of the arrays in which applied loads are scaled, also those that follow signals.
 
-
-def _scaled(arrays: Arrays, load: float) -> dict[str, Any]:
-    """Return the parts of the arrays in which applied loads are scaled, also those that follow signals."""
+    states: unknowns whose rows are no loads, but rates of states
+    """
     applied, followed = arrays.applied, arrays.followed
-    found: dict[str, Any] = {"applied": _scaled_loads(applied, load)}
+    found: dict[str, Any] = {"applied": _scaled_loads(applied, load, states)}
     if followed:
         torques = followed.torques._replace(law=followed.torques.law * load)
-        followed = followed._replace(applied=_scaled_loads(followed.applied, load), torques=torques)
+        followed = followed._replace(applied=_scaled_loads(followed.applied, load, states), torques=torques)
         found |= {"followed": followed, "signals": laid(followed)}
     return found
 
 
-def _scaled_loads(applied: Applied, load: float) -> Applied:
+def _scaled_loads(applied: Applied, load: float, states: Index | None) -> Applied:
+    kept = np.zeros(applied.fixed, dtype=bool) if states is None else np.isin(applied.row, states)
     return applied._replace(
-        coefficient=applied.coefficient * load, factor=applied.factor * load, share=applied.share * load
+        coefficient=np.where(kept, applied.coefficient, applied.coefficient * load),
+        factor=applied.factor * load,
+        share=applied.share * load,
     )
 
 

@@ -14,6 +14,7 @@ class EquilibriumStatus(StrEnum):
     OK = "ok"
     UNSTABLE = "unstable"
     UNHELD = "nothing-holds"
+    RESTLESS = "no-rest"
     UNTOLD = "cannot-be-told"
     FAILED = "failed"
 
@@ -52,6 +53,12 @@ UNBALANCED = _rejects(
 )
 FALLS = _rejects("falls-without-end", EquilibriumStatus.UNHELD, "Nothing stops the machine from falling.", _HOLD)
 WINDS_UP = _rejects("turns-without-end", EquilibriumStatus.UNHELD, "Nothing stops a body from turning.", _HOLD)
+RESTLESS = _rejects(
+    "state-does-not-rest",
+    EquilibriumStatus.RESTLESS,
+    "A state goes on changing where the machine rests, as an integrator does with an error left.",
+    "let the machine reach what the controller wants: check limits, the reference and what holds the machine",
+)
 LOOSE = _rejects(
     "nothing-holds",
     EquilibriumStatus.UNHELD,

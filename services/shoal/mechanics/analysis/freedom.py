@@ -22,7 +22,8 @@ class Freedom(NamedTuple):
 
     basis: Z, with C_q Z = 0 and Z' M Z = I, (unknowns, degrees of freedom). rank: that of C_q. dependent: combinations
     w of constraints with w' C_q = 0, orthonormal after scaling each row of C_q to unit length, (constraints, defect).
-    across, inverse: factors of the pseudo-inverse of C_q in that metric.
+    across, inverse: factors of the pseudo-inverse of C_q in that metric. states: of the user, which no constraint
+    holds: the last columns of the basis are theirs.
     """
 
     basis: Array
@@ -30,6 +31,12 @@ class Freedom(NamedTuple):
     dependent: Array
     across: Array
     inverse: Array
+    states: int = 0
+
+    @property
+    def motions(self) -> Array:
+        """The basis of the directions in which the machine moves, without states of the user."""
+        return self.basis[:, : self.degrees - self.states]
 
     @property
     def degrees(self) -> int:
@@ -65,13 +72,14 @@ class Freedom(NamedTuple):
 
 
 class Metric:
-    """The mass matrix, factored once."""
+    """The mass matrix, factored once. states: of the user, which are the last unknowns."""
 
-    def __init__(self, mass: Any) -> None:
+    def __init__(self, mass: Any, states: int = 0) -> None:
+        self.states = states
         self._lower = np.linalg.cholesky(np.asarray(mass.toarray()))
         n = len(self._lower)
         basis = scipy.linalg.solve_triangular(self._lower, np.eye(n), lower=True, trans="T")
-        self._whole = Freedom(basis, 0, np.zeros((0, 0)), np.zeros((n, 0)), np.zeros((0, 0)))
+        self._whole = Freedom(basis, 0, np.zeros((0, 0)), np.zeros((n, 0)), np.zeros((0, 0)), states)
 
     def size(self, force: Array) -> float:
         """The norm of a generalised force in the metric of M^-1 [kg^1/2 m/s^2]."""
@@ -85,9 +93,11 @@ class Metric:
         rows = scipy.linalg.solve_triangular(lower, jacobian.toarray().T, lower=True)
         lengths = np.linalg.norm(rows, axis=0)
         scale = np.divide(1.0, lengths, out=np.ones_like(lengths), where=lengths > 0)
-        left, sizes, right = np.linalg.svd(rows * scale)
+        moving = len(rows) - self.states
+        left, sizes, right = np.linalg.svd((rows * scale)[:moving])
+        left = scipy.linalg.block_diag(left, np.eye(self.states)) if self.states else left
         rank = int(np.sum(sizes > RANK))
         back = scipy.linalg.solve_triangular(lower, left, lower=True, trans="T")
         inverse = scale[:, None] * (right[:rank].T / sizes[:rank])
         dependent = scale[:, None] * right[rank:].T
-        return Freedom(back[:, rank:], rank, dependent, back[:, :rank], inverse)
+        return Freedom(back[:, rank:], rank, dependent, back[:, :rank], inverse, self.states)

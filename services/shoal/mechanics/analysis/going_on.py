@@ -13,7 +13,7 @@ from scipy.interpolate import BPoly
 from shoal.errors import InputError
 from shoal.mechanics.affine import Affine
 from shoal.mechanics.analysis import triads
-from shoal.mechanics.analysis.evaluate import Evaluator, require_no_states
+from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.assembly.groups import start_angle
 from shoal.mechanics.ended import start_angles
 from shoal.mechanics.frames import BeamFrame
@@ -59,8 +59,23 @@ def as_stated(scene: Scene, *, horizon: float = 0.0) -> Evaluator:
     model = Machine.of(scene).model(horizon)
     if isinstance(scene.initial_from, End):
         model = taken_up(model, scene.initial_from)
-    require_no_states(model)
-    return Evaluator(model, one_sided=True, signals=True)
+    return Evaluator(resting(model), one_sided=True, signals=True)
+
+
+def resting(model: Model) -> Model:
+    """Return a model at whose start states of the user stand in place of their unknowns, as `evaluate` has them."""
+    states = slice(model.unknowns - len(model.scene.states), None)
+    q, v = model.q0.copy(), np.broadcast_to(model.v0, model.q0.shape).copy()
+    q[states], v[states] = v[states], 0.0
+    return replace(model, q0=q, v0=v, shared_tiles={}) if model.scene.states else model
+
+
+def moving(model: Model) -> Model:
+    """Return the model of which `resting` returns another."""
+    states = slice(model.unknowns - len(model.scene.states), None)
+    q, v = model.q0.copy(), np.broadcast_to(model.v0, model.q0.shape).copy()
+    q[states], v[states] = 0.0, q[states].copy()
+    return replace(model, q0=q, v0=v, shared_tiles={}) if model.scene.states else model
 
 
 def _finer(state: End, scene: Scene) -> End:

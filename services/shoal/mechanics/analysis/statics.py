@@ -23,7 +23,7 @@ from shoal.mechanics import plane
 from shoal.mechanics.affine import points
 from shoal.mechanics.analysis import findings as kinds
 from shoal.mechanics.analysis import left_out
-from shoal.mechanics.analysis.balance import BALANCED, FALLS, Balance, View
+from shoal.mechanics.analysis.balance import BALANCED, FALLS, WIDEST, Balance, View
 from shoal.mechanics.analysis.damped import small
 from shoal.mechanics.analysis.equilibrium import Equilibrium
 from shoal.mechanics.analysis.evaluate import Evaluator, Sticking
@@ -153,6 +153,9 @@ class _Search:
             found = self._descended(found.point + KICK * (1 + attempt) * self._soft(found.point)[0])
         else:
             found = self._polished(found) if found.converged else found
+        if not found.converged and len(self.evaluator.states):
+            straight = self._count(self.balance.newton(q))
+            found = straight if straight.converged and self._turn(q, straight.point) < WIDEST else found
         if found.converged:
             self.pressing = self.balance.hold(found.point)
         if not found.converged and (endless := self._endless(found)):
@@ -227,7 +230,10 @@ class _Search:
         """Return the findings about the end of a search. met: on the way."""
         eigenvalues, levels, lowest = self._eigen(found.point)
         view = self.balance.look(found.point)
+        self.balance.learn(found.point)
         residual = self.balance.residual(view)
+        if restless := self.balance.restless(found.point, view):
+            return [*met, self._restless(restless)]
         if not found.converged:
             return [*met, self._unfinished(found)]
         if residual > BALANCED:
@@ -263,6 +269,8 @@ class _Search:
         """Return a finding where the machine falls or turns without end."""
         if found.message == FALLS:
             moved = found.point - self.evaluator.model.q0[:, 0]
+            if restless := self.balance.restless(found.point, self.balance.look(found.point)):
+                return [self._restless(restless)]
             return [kinds.FALLS.found(f"nothing holds {self._movers(moved)}; it falls without end")]
         turns = np.abs(self.wound) / (2 * np.pi)
         if np.max(turns, initial=0.0) <= TURNS:
@@ -270,6 +278,12 @@ class _Search:
         name, most = self.owners[int(np.argmax(turns))], float(np.max(turns))
         text = f"nothing holds {name} against {self._driving()}; after {most:.0f} turns it goes on turning"
         return [kinds.WINDS_UP.found(text, turns=most)]
+
+    def _restless(self, rates: dict[str, float]) -> Finding:
+        """Return the finding that states go on changing. rates: of their sizes [1/s]."""
+        sizes = {name: rate * float(self.scene.states[name].size) for name, rate in rates.items()}
+        changes = ", ".join(f"states.{name} by {rate:.4g}/s" for name, rate in sizes.items())
+        return kinds.RESTLESS.found(f"no rest: it goes on changing {changes}", **sizes)
 
     def _unfinished(self, found: Root[Array]) -> Finding:
         """Return the finding that a search did not come to rest."""
@@ -289,7 +303,7 @@ class _Search:
         is_pressed = any(self.pressing.values())
         pressed = self.balance.pressed(q) if is_pressed else None
         pressed = pressed if self.friction is None else self.friction.pressing
-        known = balanced and not self.evaluator.model.signals
+        known = balanced and not self.evaluator.model.signals and not self.scene.states
         react = (
             cache(lambda: reactions_of(self.evaluator, q, rest, rest, self.time, pressing=pressed)) if known else None
         )
@@ -407,6 +421,7 @@ class _Search:
             own = self.balance.spectrum_of(tangent, view)
             return own.values, own.levels, own.shapes[:, 0]
         basis = view.basis
+        tangent = tangent._replace(matrix=self.balance.holding(tangent.matrix))
         found, left, right = scipy.linalg.eig(basis.T @ (tangent.matrix @ basis), left=True)
         along, w, x = np.sum(np.conj(left) * right, axis=0), basis @ np.conj(left), basis @ right
         simple = np.abs(along) > np.sqrt(ROUND)
@@ -418,8 +433,11 @@ class _Search:
         return found if np.any(found.imag) else found.real, levels, lowest
 
     def _growth(self, q: Array, view: View) -> float | None:
-        """The largest real part [1/s] of small motions with the damping of the machine; None where it has none."""
-        if not np.any(self.evaluator.damping(q, t=self.time).data):
+        """The largest real part [1/s] of small motions with the damping of the machine; None where it has none.
+
+        States of the user are as good as damping.
+        """
+        if not len(self.evaluator.states) and not np.any(self.evaluator.damping(q, t=self.time).data):
             return None
         return float(np.max(small(self.balance, q, view).values.real, initial=0.0))
 
@@ -446,6 +464,11 @@ class _Search:
         return ", ".join(names) or "its loads"
 
     def _movers(self, displacement: Array) -> str:
+        states = displacement[self.evaluator.states] * self.evaluator.weight**0.5
+        moved = displacement - 0.0
+        moved[self.evaluator.states] = 0.0
+        if len(states) and np.max(np.abs(states)) > self.balance.length(moved):
+            return f"states.{list(self.scene.states)[int(np.argmax(np.abs(states)))]}"
         return movers(self.placement, self.balance.size, displacement)
 
     def _follow(self, q: Array) -> None:
