@@ -446,3 +446,12 @@ def test_what_a_swarm_cannot_weigh_is_refused() -> None:
     swarm = {"solver.acceleration": "afsa", "solver.duration": 0.01, "solver.integrator": "auto"}
     with pytest.raises(InputError, match=r"solver.acceleration: swarms know no states, as states.integral"):
         get_engine("gauss").simulate(Scene.parse(saturated()).with_values(swarm))
+
+
+@pytest.mark.parametrize("integrator", ["dop853", "radau5", "rk4"])
+def test_a_formula_without_a_value_from_the_start_ends_the_motion_there(integrator: str) -> None:
+    data = pendulum("log(-1 - angle(hinge)**2)")
+    data["solver"] = {"integrator": integrator, "duration": 2.0}
+    found = simulate(Scene.parse(data), np.array([2.0]))
+    assert found.findings[0].code == "not-finite"
+    assert found.findings[0].numbers["time"] == 0.0

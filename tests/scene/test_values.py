@@ -230,3 +230,19 @@ def test_ground_needs_no_point_where_only_a_direction_matters() -> None:
         )
 
     assert scene({"body": "ground"}) == scene(place)
+
+
+@pytest.mark.parametrize(
+    ("path", "why"),
+    [
+        ("controllers.pid.kp", "a controller is read as signals and states: set signals.pid_kp"),
+        ("controllers", "set signals.NAME_kp and the like"),
+        ("signals.new", "signals has kp; a new one is stated in the file of the scene"),
+        ("states.x", "states has none; a new one is stated in the file of the scene"),
+    ],
+)
+def test_what_cannot_be_set_says_what_can(path: str, why: str) -> None:
+    scene = load_scene("single-pendulum").with_values({})
+    scene = Scene.parse({**scene.model_dump(mode="json"), "signals": {"kp": 3.0}})
+    with pytest.raises(InputError, match=why):
+        scene.with_values({path: 1.0})

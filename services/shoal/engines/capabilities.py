@@ -10,7 +10,7 @@ from shoal.engines.known import ENGINES
 from shoal.errors import InputError
 from shoal.scene import GROUND, Coupling, Function, Joint, Load, PointMass, Rod, Scene, SignalFunction
 from shoal.scene.joints import places
-from shoal.scene.signals import depends_on_time
+from shoal.scene.signals import depends_on_time, sampled_parts
 
 T = TypeVar("T")
 FEATURES = (
@@ -25,6 +25,7 @@ FEATURES = (
     "functions of time",
     "signals",
     "states",
+    "sampled signals",
     "varying distances",
     "dry friction",
     "quadratic drag",
@@ -106,6 +107,8 @@ def needs(scene: Scene) -> Iterator[tuple[str, str]]:
             if isinstance(value, SignalFunction) and not value.of_time and depends_on_time(scene, value):
                 yield f"loads.{name}.{field}", "functions of time"
     yield from ((f"states.{name}", "states") for name in scene.states)
+    for name in sampled_parts(scene):
+        yield f"{'states' if name in scene.states else 'signals'}.{name}", "sampled signals"
 
 
 def _item(where: str, item: Joint | Load) -> Iterator[tuple[str, str]]:

@@ -19,6 +19,7 @@ from shoal.engines.contract import Engine
 from shoal.engines.deviation import Deviation
 from shoal.engines.event_words import Event, EventComparison
 from shoal.engines.gauss import GaussEngine
+from shoal.engines.roundings import sensitive
 from shoal.engines.sources import SOURCES, WRONG, Examined, Outcome, Rejected
 from shoal.engines.undecided import GRAZING, ORDER
 from shoal.engines.ways import as_run
@@ -47,8 +48,9 @@ class Verification:
     ground [m]; rejected: why the more careful run is itself not to be trusted; engine: that made the run, if it is not
     the native one, from which that of time is then how far it is off, whichever of them is wrong; deviations: the
     second runs, which estimate the error of any other quantity too; events: their comparison in time; undecided:
-    decisions on contacts that the time error leaves open, and the other outcome of each; unclear: contacts whose forces
-    are a choice that moves the machine; shared: impacts of several contacts at one instant whose order matters
+    decisions on contacts that the time error leaves open, and the other outcome of each; roundings: of measured values
+    that the time error leaves open; unclear: contacts whose forces are a choice that moves the machine; shared: impacts
+    of several contacts at one instant whose order matters
     """
 
     errors: ErrorBudget
@@ -60,6 +62,7 @@ class Verification:
     deviations: tuple[Deviation, ...] = field(default=(), repr=False, compare=False)
     events: EventComparison | None = None
     undecided: tuple[Outcome, ...] = ()
+    roundings: tuple[Finding, ...] = ()
     unclear: tuple[str, ...] = ()
     shared: tuple[Event, ...] = ()
 
@@ -85,7 +88,7 @@ class Verification:
     def findings(self) -> list[Finding]:
         """Return the reason for rejecting the run, or remarks on errors that are large and do not reject it."""
         rejection = self._rejection()
-        return [*(self._remarks() if rejection is None else [rejection]), *self._contacts()]
+        return [*(self._remarks() if rejection is None else [rejection]), *self._contacts(), *self.roundings]
 
     def _rejection(self) -> Finding | None:
         if self.rejected:
@@ -204,6 +207,7 @@ def verify(trajectory: Trajectory, scene: Scene, native: Engine | None = None) -
         deviations=tuple(one for each in found.values() for one in each or ()),
         events=in_time[0].events if in_time and "events" in trajectory.model else None,
         undecided=tuple(seen.outcomes),
+        roundings=tuple(filter(None, (sensitive(one.one, one.other, one.factor) for one in (in_time or ())[:1]))),
         unclear=tuple(trajectory.model.get("unclear_contacts", ())),
         shared=tuple(event for event in trajectory.model.get("events", ()) if "order" in event),
     )

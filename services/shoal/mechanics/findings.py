@@ -169,6 +169,13 @@ EVENTS_DIFFER = Kind(
     "A more careful run has other impacts, openings or rests; their motions are compared in the time error.",
     f"use {SMALLER}",
 )
+SENSITIVE_SAMPLES = Kind(
+    "sensitive-samples",
+    Severity.CAUTION,
+    "A measured value lies nearer to a tie between two roundings than the run is exact: a bit of it is not decided, "
+    "nor is what follows from it.",
+    f"use {SMALLER}",
+)
 POINT_REJECTED = Kind(
     "point-rejected", Severity.CAUTION, "A lane that was run alone with its errors estimated is rejected."
 )

@@ -16,6 +16,7 @@ from shoal.mechanics.forces import Forces
 from shoal.mechanics.model import Model
 from shoal.mechanics.narrow import narrow
 from shoal.mechanics.numerics.tile import Array, Index, Tile
+from shoal.scene.sampled import merged_instants
 
 CROSSED = 0.5
 """Largest fraction of an interval between two marks of a force law that one step may cross."""
@@ -26,11 +27,16 @@ EDGE = 1e-9
 
 
 class Halts(NamedTuple):
-    """Times [s], increasing, that steps end at; of force element k the marks start[k]:start[k+1] on its elongation."""
+    """Times [s], increasing, that steps end at; of force element k the marks start[k]:start[k+1] on its elongation.
+
+    due: which samples are due at each of the times, see `sampled.merged_instants`, and `first` at time 0.
+    """
 
     times: Array
     start: Index
     marks: Array
+    due: Index
+    first: int
 
 
 def halts(model: Model, end: float, longest: float, adaptive: bool) -> Halts:
@@ -43,12 +49,30 @@ def halts(model: Model, end: float, longest: float, adaptive: bool) -> Halts:
     times = np.unique(np.concatenate([np.zeros(0), *found]))
     times = times[(times > RESOLUTION * end) & (times <= end)]
     times = times[np.diff(times, prepend=0.0) > RESOLUTION * end]
-    if found and not adaptive and np.ceil(end / longest - EDGE) * longest > end * (1 + EDGE):
+    clocked, due = merged_instants(model.clocks, end)
+    first = int(due[0]) if len(due) and clocked[0] == 0.0 else 0
+    times, asked = _together(times, clocked[clocked > 0.0], due[clocked > 0.0], RESOLUTION * end)
+    if (found or model.clocks) and not adaptive and np.ceil(end / longest - EDGE) * longest > end * (1 + EDGE):
         # Functions of time are known up to the end of the run.
-        times = np.append(times[times < end * (1 - RESOLUTION)], end)
+        inside = times < end * (1 - RESOLUTION)
+        times, asked = np.append(times[inside], end), np.append(asked[inside], 0)
     found = [model.function(int(number)).kinks if number >= 0 else np.zeros(0) for number in model.forces.table]
     start = np.cumsum([0, *(len(part) for part in found)], dtype=np.int64)
-    return Halts(times, start, np.concatenate([np.zeros(0), *found]))
+    return Halts(times, start, np.concatenate([np.zeros(0), *found]), asked, first)
+
+
+def _together(times: Array, clocked: Array, due: Index, least: float) -> tuple[Array, Index]:
+    """Merge instants of samples into breakpoints, and what is due then; those that are closer than `least` are one."""
+    if not len(clocked):
+        return times, np.zeros(len(times), dtype=np.int64)
+    at = np.searchsorted(times, clocked)
+    for side in (at - 1, at):
+        near = times[np.clip(side, 0, len(times) - 1)] if len(times) else np.full(len(clocked), np.inf)
+        clocked = np.where(abs(near - clocked) <= least, near, clocked)
+    merged, where = np.unique(np.concatenate([times, clocked]), return_inverse=True)
+    found = np.zeros(len(merged), dtype=np.int64)
+    np.bitwise_or.at(found, where[len(times) :], due)
+    return merged, found
 
 
 @njit(cache=True, error_model="numpy")

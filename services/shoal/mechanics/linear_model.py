@@ -42,7 +42,19 @@ from shoal.mechanics.reach import span
 from shoal.mechanics.simulate import simulate
 from shoal.scene import DistributedForce, Force, PointMass, Revolute, Scene, SignalFunction, Slider, Torque
 from shoal.scene.formula import Measure, Node
-from shoal.scene.signals import SLIDING, TURNING, Constant, StateValue, Table, check_leaves, is_of_time, written_out
+from shoal.scene.signals import (
+    SLIDING,
+    TURNING,
+    Constant,
+    StateValue,
+    Table,
+    check_leaves,
+    continuous_states,
+    formula_of,
+    is_of_time,
+    refuse_sampled,
+    written_out,
+)
 
 Complex = npt.NDArray[np.complex128]
 ABOUT = ("equilibrium", "start", "trajectory")
@@ -181,6 +193,9 @@ def linearize(
     """
     one_of("about", about, ABOUT)
     check(time=time)
+    refuse_sampled(
+        scene, "linear models are of continuous time; leave the controller out, and take its load as an input"
+    )
     if about == "trajectory" and not time > 0.0:
         raise InputError(f"time: a trajectory is linearized at a time after 0 s, found {time:g}")
     opened, signals = _open(scene, inputs, time)
@@ -207,13 +222,13 @@ def linearize(
     if state.balance is not None:
         a, c, poles = _at_rest(state.balance, state, probe, to, own)
         if users:
-            units = np.array([float(one.size) for one in scene.states.values()])
+            units = np.array([float(one.size) for one in continuous_states(scene).values()])
             a, c = (_in_units(part, len(to), units, rates) for part, rates in ((a, True), (c, False)))
         error = float(np.finfo(float).eps * np.linalg.cond(to)) if len(to) else 0.0
     elif chosen:
         probed = Probed(chosen, [*(count + k for k in chosen), *kept], own)
         smooth = [one.coulomb_speed for one in scene.joints.values() if isinstance(one, Revolute | Slider) and one.dry]
-        narrow, sizes = min(smooth, default=np.inf), [one.size for one in scene.states.values()]
+        narrow, sizes = min(smooth, default=np.inf), [one.size for one in continuous_states(scene).values()]
         found = slopes(evaluator, state.q, state.v, time, probed, span(scene), sizes, narrow)
         a, c, error, poles = found.a, found.c, found.error, None
         kind = kinds.BY_DIFFERENCES if error < COARSE else kinds.DIFFERENCES_PART
@@ -347,7 +362,7 @@ def _open(scene: Scene, inputs: Sequence[str], time: float) -> tuple[Scene, list
     signals, loads, names = dict(scene.signals), dict(scene.loads), []
     for name in inputs:
         if name in signals and name not in loads:
-            signal = signals[name]
+            signal = formula_of(signals[name])
             if not is_of_time(written_out(scene, signal)):
                 raise InputError(
                     f"inputs: signals.{name} follows the motion; an input is a number or a function of time"

@@ -180,11 +180,12 @@ def loop(frame):  # type: ignore[no-untyped-def]
     step, steps, tolerance = frame.step, frame.steps, frame.tolerance
     times, marker_rows = carray(frame.times, frame.samples), carray(frame.marker_rows, frame.directed)
     stops, marks = carray(frame.halts.times, frame.stops), carray(frame.halts.marks, frame.marks)
-    halts = Halts(stops, frame.halts.start, marks)
+    due = carray(frame.halts.due, frame.stops)
+    halts = Halts(stops, frame.halts.start, marks, due, frame.halts.first)
     free, last, own = scheme.adaptive, halts.times.size - 1, k.progress
     if own[BEGUN] == 0.0:
         w.until[0] = np.nextafter(halts.times[0], 0.0) if last >= 0 else np.inf
-        _begin(tile, m, w, k, record, marker_rows, tolerance)
+        _begin(tile, m, w, k, record, marker_rows, tolerance, halts.first)
         own[BEGUN], own[TAKEN], own[WHOLE] = 1.0, step, 1.0
         own[ENDING] = times[-1] if free or (last >= 0 and halts.times[last] == times[-1]) else steps * step
     ending = own[ENDING]
@@ -218,8 +219,11 @@ def loop(frame):  # type: ignore[no-untyped-def]
         if own[DONE] > 0.0 or number + cuts >= room:
             break
         if halt <= last and now == halts.times[halt]:
+            asked = halts.due[halt]
             halt += 1
             w.until[0] = np.nextafter(halts.times[halt], 0.0) if halt <= last else np.inf
+            if asked != 0:
+                signals.follow(tile, m, w, now, w.z, w.zdot, w.z, signals.SAMPLE + signals.PARTS * asked)
             if frame.first_switch != 0:
                 signals.follow(tile, m, w, now, w.z, w.zdot, w.z, signals.SETTLE)
             _leave_halt(tile, scheme, m, w, k, now, tolerance, record.energy_scale)
@@ -268,17 +272,27 @@ def loop(frame):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _begin(tile: Tile, m: Arrays, w: Work, k: LoopRoom, record: Marched, marker_rows: Index, tolerance: float) -> None:
-    """Make the start consistent and keep it, find its acceleration, its energy and the sides of the directions."""
+def _begin(
+    tile: Tile, m: Arrays, w: Work, k: LoopRoom, record: Marched, marker_rows: Index, tolerance: float, due: int
+) -> None:
+    """Make the start consistent and keep it, find its acceleration, its energy and the sides of the directions.
+
+    due: samples that are taken at the start.
+    """
     end = m.unknowns * len(tile)
     kernels.settle(tile, m, w, 0.0, tolerance, ASSEMBLY)
     if m.table.signals != 0:
+        if due != 0:
+            signals.follow(tile, m, w, 0.0, w.z, w.zdot, w.z, signals.SAMPLE + signals.PARTS * due)
         signals.follow(tile, m, w, 0.0, w.z, w.zdot, w.z, signals.SETTLE)
     for i in range(end):
         record.begin[i], record.begin[end + i] = w.z[i], w.zdot[i]
     kernels.acceleration(tile, m, w, 0.0, w.z, w.zdot, tolerance, w.a)
     for lane in range(len(tile)):
         k.last_power[lane] = w.power[lane]
+    for i in range(end):
+        if not np.isfinite(w.a[i]) and w.gauss.ended[i % len(tile)] < 0.0:
+            w.gauss.ended[i % len(tile)] = 0.0
     _energy(tile, m, w, k.start, record.energy_scale)
     _count_turns(tile, m, w, k, marker_rows)
     for i in range(marker_rows.size // (2 * m.dimensions) * len(tile)):

@@ -36,6 +36,7 @@ from shoal.mechanics.saddle import Saddle
 from shoal.mechanics.signals import Signals
 from shoal.scene import Scene
 from shoal.scene.joints import places
+from shoal.scene.sampled import Clock
 
 
 class FunctionTable(NamedTuple):
@@ -125,7 +126,8 @@ class Model:
     (rows, lanes) or (rows, 1). start_angles: relative angles at the start that angle forces count
     their turns from [rad], (forces, lanes) or (forces, 1); gap_angles, signal_angles: the same of gaps and of signals;
     gap_fields, signal_fields: what states them; signal_names: of the constants of signals; probed: numbers of the
-    strengths that formulas beside those of loads are. kinks: of every function, where it or a derivative jumps.
+    strengths that formulas beside those of loads are. clocks: instants of samples, and a field that follows each;
+    sampled: names of what is sampled, by number. kinks: of every function, where it or a derivative jumps.
     owners: for each family of elements the body of every element. failed: lanes whose start contradicts the joints,
     (lanes,) or (1,). frames: kinematics of the bodies. mass_entries, lent_entries, stretching_entries: the lower
     triangles of the mass matrix, of the mass added to thin bodies, and of the rods' stiffness against stretching, see
@@ -172,6 +174,8 @@ class Model:
     signal_fields: tuple[str, ...]
     signal_names: tuple[str, ...]
     recorded: tuple[str, ...]
+    clocks: tuple[tuple[Clock, str], ...]
+    sampled: tuple[str, ...]
     probed: tuple[int, ...]
     slowed: int = 0
     marker_angles: Array | None = None

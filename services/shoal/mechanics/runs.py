@@ -109,6 +109,7 @@ class Runs:
         left: list[tuple[Array, Array, Array]] = []
         happened: list[dict[str, Any]] = []
         recorded: dict[str, list[float]] = {}
+        tie: dict[str, Any] = {}
         closed: list[str] = []
         unclear: list[str] = []
         words: list[list[tuple[float, str]]] = [[] for _ in range(moved.lanes)]
@@ -133,6 +134,7 @@ class Runs:
                 happened.extend(space.events)
                 if moved.recorded:
                     recorded.update(space.recorded)
+                    tie.update(space.nearest_tie)
                 closed.extend(space.closed)
                 unclear.extend(space.unclear)
             if single not in self._found:
@@ -165,7 +167,7 @@ class Runs:
         largest = np.maximum.reduce(numbers, axis=1)
         facts = pickle.loads(self._found[single])
         facts["evaluations"] = int(largest[EVALUATIONS])
-        facts |= {"signals": recorded} if recorded else {}
+        facts |= ({"signals": recorded} if recorded else {}) | ({"nearest_tie": tie} if tie else {})
         if self.model.gaps.size and single:
             facts["events"], facts["closed_contacts"] = happened, closed
             facts |= {"unclear_contacts": unclear} if unclear else {}

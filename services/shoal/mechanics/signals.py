@@ -1,11 +1,12 @@
 """Signals: loads that follow formulas of time and of measures of the machine, which a tape evaluates.
 
     evaluate ─ measures, places, functions of time ─ tape.run
+    sample   ─ samples.take ─ what is held until the next one
     act      ─ every load with the value of its register as its strength
     linearise ─ tape.reverse ─ derivatives of the strengths by coordinates and rates
 
-Registers hold the value and the rate of every measure, positions, velocities, functions of time, constants, and the
-results of the tape, in this order.
+Registers hold the value and the rate of every measure, positions, velocities, functions of time, samples, constants,
+and the results of the tape, in this order.
 """
 
 from __future__ import annotations
@@ -19,16 +20,18 @@ from shoal.compile import function_pointers
 from shoal.compile.pointers import raw_type, shift
 from shoal.compile.structures import Reference
 from shoal.compile.vector import add, add_product, copy
-from shoal.mechanics import applied, forces, functions, tape
+from shoal.mechanics import applied, forces, functions, samples, tape
 from shoal.mechanics.applied import Applied
 from shoal.mechanics.derived import derive, fold
 from shoal.mechanics.forces import Forces
 from shoal.mechanics.numerics.tile import Array, Index, Tile
+from shoal.mechanics.samples import Samples
 
-ACT, REMEMBER, LINEARISE, DERIVE, SETTLE, TURN, RECORD = range(7)
+ACT, REMEMBER, LINEARISE, DERIVE, SETTLE, TURN, RECORD, SAMPLE = range(8)
 """What the kernel does: evaluate all and add the loads to the forces; count the turns of angles; evaluate all and
 `linearise`; `linearise` what was evaluated last; set all switches that are held by their arguments; turn those that
-are marked; or evaluate all and copy what is recorded to f."""
+are marked; evaluate all and copy what is recorded to f; or take the samples due, of which part // PARTS tells."""
+PARTS = 8
 FORCE, BY_PLACE, BY_RATE = range(3)
 """What `linearise` makes of every strength."""
 BLOCKS = 3
@@ -37,11 +40,12 @@ BLOCKS = 3
 class Signals(NamedTuple):
     """Measures, tape and loads of one tile.
 
-    measures: without any law. positions, velocities: rows of the state, and how many. functions: of time, by number.
-    constant: (constants, lanes). code: of the tape, `size` instructions, whose results are the registers from `first`
-    on. strength: registers that loads follow, and how many; switch: instructions that switch; output: registers that
-    are recorded. applied, torques: loads, in whose lists of functions registers stand; torques of the plane act along
-    their measure, times the amplitude of its law.
+    always: how many measures, positions, velocities, functions and instructions are evaluated at all times; what
+    follows them is for samples. measures: without any law. positions, velocities: rows of the state, and how many.
+    functions: of time, by number. constant: (constants, lanes). code: of the tape, `size` instructions, whose results
+    are the registers from `first` on. strength: registers that loads follow, and how many; switch: instructions that
+    switch; output: registers that are recorded. applied, torques: loads, in whose lists of functions registers stand;
+    torques of the plane act along their measure, times the amplitude of its law.
     """
 
     measures: Forces
@@ -62,6 +66,8 @@ class Signals(NamedTuple):
     switches: int
     output: Index
     outputs: int
+    always: Index
+    samples: Samples
     applied: Applied
     torques: Forces
 
@@ -75,8 +81,8 @@ def room(signals: Any, width: int, rows: int) -> Array:
     """Return the room of the signals of a tile.
 
     The continuous angles of measures; whether switches are held, in every lane, their branches, marks, largest
-    arguments and margins at the beginning of the step; the registers, their adjoints, one row of power, and what
-    `linearise` finds: the blocks of every strength, then its derivatives by the constants.
+    arguments and margins at the beginning of the step; what samples keep; the registers, their adjoints, one row of
+    power, and what `linearise` finds: the blocks of every strength, then its derivatives by the constants.
     """
     if not signals:
         return np.zeros(0)
@@ -87,7 +93,7 @@ def room(signals: Any, width: int, rows: int) -> Array:
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _before(s: Signals) -> int:
     """Rows of the room before the registers."""
-    return s.measures.size + 1 + 4 * s.switches
+    return s.measures.size + 1 + 4 * s.switches + s.samples.pending
 
 
 SMALL = 1e-12
@@ -109,6 +115,22 @@ def hold(signals: Signals, own: Array) -> None:
 def register(signals: Signals, own: Array) -> Array:
     """Return the registers in the room of one lane, (registers,)."""
     return own[_before.py_func(signals) :][: registers(signals)]
+
+
+def begin_samples(signals: Signals, own: Array, lanes: int) -> None:
+    """Put what samples keep to its beginning; own: (rows, lanes) as numbers in a row."""
+    rows = signals.samples.pending
+    end = _before.py_func(signals) * lanes
+    own[end - rows * lanes : end] = 0.0
+    first = (signals.first - signals.constants - signals.samples.held) * lanes
+    own[end + first :][: signals.samples.begin.size] = signals.samples.begin
+
+
+def nearest_tie(signals: Signals, own: Array) -> tuple[float, float, int, float]:
+    """Return what the room of one lane keeps of roundings, see `samples.NEAREST`."""
+    end = _before.py_func(signals)
+    near, time, number, codes = own[end - signals.samples.pending :][: samples.FIRST_PENDING].tolist()
+    return near, time, int(number), codes
 
 
 def feedback(signals: Signals, own: Array, rows: int) -> Array:
@@ -152,29 +174,52 @@ def _held(tile: Tile, s: Signals, own: Array) -> bool:
 
 @njit(cache=True, error_model="numpy")
 def evaluate(tile: Tile, s: Signals, m: Any, w: Any, t: float, z: Array, zdot: Array) -> None:
-    """All registers at a state whose derived rows are filled. Uses w.element."""
+    """The registers that are evaluated at all times, at a state whose derived rows are filled. Uses w.element."""
+    counts = (s.always[0], s.always[1], s.always[2], s.always[3])
+    _enter(tile, s, m, w, t, z, zdot, counts)
+    register, branch, held = _registers(tile, s, w.signals), _branches(tile, s, w.signals), _held(tile, s, w.signals)
+    tape.run(tile, s.code, s.always[4], s.first, register, branch, held)
+
+
+@njit(cache=True, error_model="numpy")
+def _enter(
+    tile: Tile, s: Signals, m: Any, w: Any, t: float, z: Array, zdot: Array, counts: tuple[int, int, int, int]
+) -> None:
+    """Enter measures, places, rates, functions of time, so many of each, and constants into their registers."""
     width, register, at = len(tile), _registers(tile, s, w.signals), 0
     value = forces.value_row(s.measures)
-    for k in range(s.measures.size):
+    for k in range(counts[0]):
         forces.measure(tile, s.measures, k, z, w.signals, w.element)
         forces.slip(tile, s.measures, k, zdot, w.element)
         copy(tile, register, at, w.element, value)
         copy(tile, register, at + 1, w.element, value + 1)
         at += 2
-    for k in range(s.positions):
+    at = 2 * s.measures.size
+    for k in range(counts[1]):
         copy(tile, register, at + k, z, s.position[k])
     at += s.positions
-    for k in range(s.velocities):
+    for k in range(counts[2]):
         copy(tile, register, at + k, zdot, s.velocity[k])
     at += s.velocities
-    for k in range(s.functions):
+    for k in range(counts[3]):
         number = functions.evaluate(m.functions, s.function[k], t, 0)
         for lane in range(width):
             register[(at + k) * width + lane] = number
-    at += s.functions
+    at += s.functions + s.samples.held
     for k in range(s.constants):
         copy(tile, register, at + k, s.constant, k)
-    tape.run(tile, s.code, s.size, s.first, register, _branches(tile, s, w.signals), _held(tile, s, w.signals))
+
+
+@njit(cache=True, error_model="numpy")
+def _sample(tile: Tile, s: Signals, m: Any, w: Any, t: float, z: Array, zdot: Array, due: int) -> None:
+    """Evaluate all registers, and take the samples that are due, for which switches are as their arguments are."""
+    derive(tile, m.derived, z, m.unknowns, m.force_rows, False)
+    derive(tile, m.derived, zdot, m.unknowns, m.force_rows, True)
+    _enter(tile, s, m, w, t, z, zdot, (s.measures.size, s.positions, s.velocities, s.functions))
+    register, branch = _registers(tile, s, w.signals), _branches(tile, s, w.signals)
+    tape.run(tile, s.code, s.always[4], s.first, register, branch, due == 0 and _held(tile, s, w.signals))
+    room = shift(w.signals, (_before(s) - s.samples.pending) * len(tile))
+    samples.take(tile, s.samples, s.code, s.always[4], s.first, register, room, due, t)
 
 
 # Of a single lane:
@@ -292,8 +337,8 @@ def linearise(tile: Tile, s: Signals, m: Any, w: Any, z: Array, zdot: Array) -> 
             adjoint[i] = 1.0 if i // width == s.strength[k] else 0.0
         act(tile, s, adjoint, z, zdot, force, power, w.element)
         branch, held = _branches(tile, s, w.signals), _held(tile, s, w.signals)
-        tape.reverse(tile, s.code, s.size, s.first, register, branch, held, adjoint)
-        for number in range(s.measures.size):
+        tape.reverse(tile, s.code, s.always[4], s.first, register, branch, held, adjoint)
+        for number in range(s.always[0]):
             forces.gradient(tile, s.measures, number, z, w.element)
             copy(tile, w.element, value, adjoint, 2 * number)
             copy(tile, w.element, value + 1, adjoint, 2 * number + 1)
@@ -319,6 +364,9 @@ def _signals(tile, s, m, w, t, z, zdot, f, part):  # type: ignore[no-untyped-def
     if part == REMEMBER:
         forces.remember(tile, s.measures, z, w.signals)
         return
+    if part >= SAMPLE:
+        _sample(tile, s, m, w, t, z, zdot, part // PARTS)
+        return
     if part in (SETTLE, TURN):
         if _held(tile, s, w.signals):
             _settle(tile, s, m, w, t, z, zdot, part == TURN)
@@ -326,6 +374,8 @@ def _signals(tile, s, m, w, t, z, zdot, f, part):  # type: ignore[no-untyped-def
     if part != DERIVE:
         evaluate(tile, s, m, w, t, z, zdot)
     if part == RECORD:
+        if s.samples.size > 0:
+            _sample(tile, s, m, w, t, z, zdot, 0)
         for k in range(s.outputs):
             copy(tile, f, k, _registers(tile, s, w.signals), s.output[k])
     elif part in (LINEARISE, DERIVE):

@@ -23,7 +23,7 @@ from shoal.mechanics.march import March
 from shoal.mechanics.marched import Marched, framed
 from shoal.mechanics.model import Arrays, Model
 from shoal.mechanics.numerics.tile import Array, Tile, pack
-from shoal.mechanics.signals import hold, switches_held
+from shoal.mechanics.signals import begin_samples, hold, nearest_tie, switches_held
 from shoal.scene import Solver
 
 T = TypeVar("T")
@@ -53,6 +53,7 @@ def put_at_start(model: Model, tile: Tile, part: slice, arrays: Arrays, room: Wo
         if switches_held(arrays, tile):
             hold(followed, room.signals)
         room.signals[: start.size] = forces.initial_memory(tile, followed.measures, room.z, start)
+        begin_samples(followed, room.signals, len(tile))
     if model.gaps.size:
         derived_rows(tile, arrays, room)
         start = pack(model.gap_angles, part, tile)
@@ -111,6 +112,7 @@ class Workspace:
             arrays = arrays._replace(elements=elements, families=lay(elements))
         settings = choose(solver, model, tile, part, choice.name)
         steps = solver.max_steps if facts(choice.name).adaptive else int(np.ceil(times[-1] / solver.step - 1e-9))
+        steps += int(np.count_nonzero(halts.due)) if facts(choice.name).adaptive else 0
         rows = np.concatenate([model.marker_rows.ravel(), states.rows(model)]) if whole else model.marker_rows.ravel()
         scheme = connect(tile, settings, arrays, room)
         frame = framed(tile, scheme, arrays, room, solver.step, steps, times.copy(), rows, solver.rank_tolerance, halts)
@@ -148,6 +150,15 @@ class Workspace:
         names = self._model.recorded
         columns = self.march.frame.record.signals.reshape(-1, max(1, len(names))).T.tolist()
         return dict(zip(names, columns, strict=False))
+
+    @property
+    def nearest_tie(self) -> dict[str, Any]:
+        """The measured value nearest to a tie between two roundings, of a march of one lane; empty without any."""
+        followed = self.march.frame.arrays.followed
+        if not followed or not np.any(followed.samples.quantum):
+            return {}
+        near, time, number, codes = nearest_tie(followed, self.march.frame.room.signals)
+        return {"signal": self._model.sampled[number], "time": time, "quanta": 0.5 - near, "checksum": codes}
 
     @property
     def closed(self) -> list[str]:

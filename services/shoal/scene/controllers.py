@@ -1,7 +1,7 @@
 """Controllers of a scene: templates that become signals and states when the scene is read.
 
 A controller NAME is the signal NAME, its output. Its gains are signals that are numbers, NAME_kp and so on, which are
-swept and identified like these; its memory are states.
+swept and identified like these; its memory are states. With `sampled` both are sampled.
 """
 
 from __future__ import annotations
@@ -12,10 +12,23 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, TypeAdapter, ValidationError, model_validator
 
 from shoal.scene.record import Positive, Record, one_line
+from shoal.scene.sampled import Sampling
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 Formulas = tuple[dict[str, Any], dict[str, Any]]
 """Signals and states by name."""
+
+
+def _sample(sampled: Sampling, formula: str, *, measured: bool = False, late: bool = False) -> dict[str, Any]:
+    """Return a sampled signal; measured: with the quantum, late: with the delay of a controller."""
+    instants = sampled.model_dump(exclude={"quantum", "delay"})
+    finely = {"quantum": sampled.quantum} if measured else {}
+    return {"sample": formula, **instants, **finely, **({"delay": sampled.delay} if late else {})}
+
+
+def _next(sampled: Sampling, formula: str, start: float = 0.0) -> dict[str, Any]:
+    """Return a sampled state."""
+    return {"next": formula, **sampled.model_dump(include={"period", "first"}), "start": start}
 
 
 class Pid(Record):
@@ -40,10 +53,12 @@ class Pid(Record):
     """Time constant [s] with which the integral is brought back from a limit: anti-windup by back-calculation."""
     start: float = 0.0
     """Integral part at the start [1]."""
+    sampled: Sampling | None = None
+    """Its instants, if it is sampled."""
 
     @model_validator(mode="after")
     def _complete(self) -> Pid:
-        if self.kd and self.rate is None and self.filter is None:
+        if self.kd and self.rate is None and self.filter is None and self.sampled is None:
             raise ValueError(
                 "kd: state the `rate` of the error, a formula, or a `filter`, the time constant of its rate"
             )
@@ -55,6 +70,8 @@ class Pid(Record):
 
     def formulas(self, name: str) -> Formulas:
         """Return the signals and states that a controller of this name is."""
+        if self.sampled is not None:
+            return self._sampled(name, self.sampled)
         signals: dict[str, Any] = {f"{name}_error": self.of, f"{name}_kp": self.kp}
         states: dict[str, Any] = {}
         parts = [f"{name}_kp*{name}_error"]
@@ -79,6 +96,41 @@ class Pid(Record):
             output = f"min(max({name}_wanted, {self.limits[0]!r}), {self.limits[1]!r})"
         return {**signals, name: output}, states
 
+    def _sampled(self, name: str, sampled: Sampling) -> Formulas:
+        """Return the same, sampled: the integral by forward, rates by backward differences (Astrom and Hagglund 2006).
+
+        The difference of the error is 0 at the first instant.
+        """
+        period, error, states = sampled.period, f"{name}_error", dict[str, Any]()
+        signals: dict[str, Any] = {error: _sample(sampled, self.of, measured=True), f"{name}_kp": self.kp}
+        parts = [f"{name}_kp*{error}"]
+        if self.ki:
+            signals[f"{name}_ki"] = self.ki
+            parts.append(f"{name}_integral")
+        if self.kd:
+            signals[f"{name}_kd"], late = self.kd, self.filter or 0.0
+            if self.rate is None:
+                states[f"{name}_last"] = _next(sampled, error)
+                states[f"{name}_begun"] = _next(sampled, "1")
+                change = f"{name}_begun*({error} - {name}_last)"
+            else:
+                change = f"{period!r}*({self.rate})" if late else f"({self.rate})"
+            rate = change if self.rate is not None and not late else f"({change})/{period + late!r}"
+            if late:
+                states[f"{name}_filter"] = _next(sampled, f"{name}_rate")
+                rate = f"({late!r}*{name}_filter + {change})/{period + late!r}"
+            signals[f"{name}_rate"] = _sample(sampled, rate)
+            parts.append(f"{name}_kd*{name}_rate")
+        output = " + ".join(parts)
+        if self.limits is not None:
+            signals[f"{name}_wanted"] = _sample(sampled, output)
+            output = f"min(max({name}_wanted, {self.limits[0]!r}), {self.limits[1]!r})"
+        if self.ki:
+            back = f" + {period!r}*({output} - {name}_wanted)/{self.tracking!r}" if self.tracking is not None else ""
+            integral = f"{name}_integral + {period!r}*{name}_ki*{error}{back}"
+            states[f"{name}_integral"] = _next(sampled, integral, self.start)
+        return {**signals, name: _sample(sampled, output, late=True)}, states
+
 
 class StateFeedback(Record):
     """State feedback, -gain (x - about), as of a linear-quadratic regulator."""
@@ -90,6 +142,8 @@ class StateFeedback(Record):
     """One gain for each [1]."""
     about: tuple[float, ...] | None = None
     """Where the feedback vanishes, by state [1]; by default at zero."""
+    sampled: Sampling | None = None
+    """Its instants, if it is sampled."""
 
     @model_validator(mode="after")
     def _one_each(self) -> StateFeedback:
@@ -104,17 +158,19 @@ class StateFeedback(Record):
         signals: dict[str, Any] = {}
         parts = []
         for k, (one, gain) in enumerate(zip(self.of, self.gain, strict=True), 1):
-            signals |= {f"{name}_x{k}": one, f"{name}_k{k}": gain}
+            measured = one if self.sampled is None else _sample(self.sampled, one, measured=True)
+            signals |= {f"{name}_x{k}": measured, f"{name}_k{k}": gain}
             away = f"{name}_x{k}"
             if self.about is not None:
                 signals[f"{name}_about{k}"] = self.about[k - 1]
                 away = f"({away} - {name}_about{k})"
             parts.append(f"{name}_k{k}*{away}")
-        return {**signals, name: f"-({' + '.join(parts)})"}, {}
+        output = f"-({' + '.join(parts)})"
+        return {**signals, name: output if self.sampled is None else _sample(self.sampled, output, late=True)}, {}
 
 
 class TransferFunction(Record):
-    """A transfer function num/den of s, by polynomials with the highest power first, from rest."""
+    """A transfer function num/den of s, or of z if it is sampled, by polynomials, highest power first, from rest."""
 
     kind: Literal["transfer-function"] = "transfer-function"
     of: str
@@ -123,6 +179,8 @@ class TransferFunction(Record):
     """Coefficients of the numerator [1]."""
     den: Annotated[tuple[float, ...], Field(min_length=1, max_length=10)]
     """Coefficients of the denominator, of the same or a higher degree [1]."""
+    sampled: Sampling | None = None
+    """Its instants, if it is sampled."""
 
     @model_validator(mode="after")
     def _proper(self) -> TransferFunction:
@@ -142,14 +200,30 @@ class TransferFunction(Record):
         order = len(self.den) - 1
         a = [one / self.den[0] for one in self.den]
         b = [0.0] * (order + 1 - len(self.num)) + [one / self.den[0] for one in self.num]
+        if self.sampled is not None:
+            return self._sampled(name, self.sampled, a, b)
         pace = max((abs(a[k]) ** (1.0 / k) for k in range(1, order + 1)), default=0.0) or 1.0
         a, b = ([one / pace**k for k, one in enumerate(each)] for each in (a, b))
         signals: dict[str, Any] = {f"{name}_in": self.of}
         turns = "".join(f" - {a[k]!r}*{name}_{k}" for k in range(1, order + 1))
         states: dict[str, Any] = {f"{name}_1": {"rate": f"{pace!r}*({name}_in{turns})"}} if order else {}
         states |= {f"{name}_{k}": {"rate": f"{pace!r}*{name}_{k - 1}"} for k in range(2, order + 1)}
-        parts = [f"{b[0]!r}*{name}_in"] + [f"{b[k] - b[0] * a[k]!r}*{name}_{k}" for k in range(1, order + 1)]
-        return {**signals, name: " + ".join(parts)}, states
+        return {**signals, name: _output(name, a, b)}, states
+
+    def _sampled(self, name: str, sampled: Sampling, a: list[float], b: list[float]) -> Formulas:
+        """Return the same of z, by the coefficients over that of the highest power of the denominator."""
+        order = len(a) - 1
+        turns = "".join(f" - {a[k]!r}*{name}_{k}" for k in range(1, order + 1))
+        states = {f"{name}_1": _next(sampled, f"{name}_in{turns}")} if order else {}
+        states |= {f"{name}_{k}": _next(sampled, f"{name}_{k - 1}") for k in range(2, order + 1)}
+        signals = {f"{name}_in": _sample(sampled, self.of, measured=True)}
+        return {**signals, name: _sample(sampled, _output(name, a, b), late=True)}, states
+
+
+def _output(name: str, a: list[float], b: list[float]) -> str:
+    """Return the output of a transfer function in controllable form."""
+    parts = [f"{b[0]!r}*{name}_in"] + [f"{b[k] - b[0] * a[k]!r}*{name}_{k}" for k in range(1, len(a))]
+    return " + ".join(parts)
 
 
 Controller = Annotated[Pid | StateFeedback | TransferFunction, Field(discriminator="kind")]

@@ -13,6 +13,7 @@ from shoal.errors import InputError
 from shoal.scene.function import Function
 from shoal.scene.initial import Begin, InitialState
 from shoal.scene.record import Record
+from shoal.scene.sampled import INSTANTS, Sampled, SampledState
 
 _VECTORS = (".rotation", ".spin")
 """Of a start in space."""
@@ -64,8 +65,8 @@ def lanes_of(part: Any) -> int:
 
 
 def shared(place: Any, path: list[str]) -> bool:
-    """Return whether lanes cannot differ in the number at a path: it lies in a function of time, or in a list of
-    lists. They can in a signal that is a number.
+    """Return whether lanes cannot differ in the number at a path: it lies in a function of time, in a list of
+    lists, or among instants. They can in a signal that is a number.
     """
     for part, below in zip(path, [*path[1:], ""], strict=True):
         if isinstance(place, Mapping):
@@ -76,6 +77,8 @@ def shared(place: Any, path: list[str]) -> bool:
             place = place[int(part)]
         else:
             place = getattr(place, part, None)
+        if isinstance(place, Sampled | SampledState) and below in INSTANTS:
+            return True
         if isinstance(place, Function):
             return path != ["signals", part] or place.number is None
     return False
@@ -95,6 +98,18 @@ def unknown(path: str, parent: str, place: Any) -> InputError:
     if place is None and parent.startswith("initial.") and parent.endswith((".position", *_VECTORS)):
         whole = ", such as [0, 0, 0]" if parent.endswith(_VECTORS) else ""
         return InputError(f"{path}: {parent} is not stated, so it has no component to set; state it whole{whole}")
+    if parent == "controllers" or path.split(".")[0] == "controllers":
+        name, *gain = path.split(".")[1:] or ["NAME"]
+        such = f"signals.{name}_{gain[0]}" if len(gain) == 1 else f"signals.{name}_kp and the like"
+        return InputError(
+            f"{path}: no such field; a controller is read as signals and states: set {such}, or state another "
+            "controller in the file of the scene"
+        )
+    if parent in ("signals", "states"):
+        return InputError(
+            f"{path}: no such field; {parent} has {', '.join(place or ()) or 'none'}; a new one is stated in the file "
+            "of the scene"
+        )
     if isinstance(place, Record):
         place = type(place).model_fields
     if isinstance(place, Begin):

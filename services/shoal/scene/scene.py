@@ -22,7 +22,7 @@ from shoal.scene.controllers import Controller, with_controllers
 from shoal.scene.dimensions import Dimensions, check_dimensions, padded
 from shoal.scene.ended import End
 from shoal.scene.expect import Expectation, ExpectedValue
-from shoal.scene.function import Function, SignalFunction
+from shoal.scene.function import Function
 from shoal.scene.initial import (
     FROM,
     INITIAL,
@@ -39,7 +39,8 @@ from shoal.scene.joints import GROUND, Attachment, Joint, MovingPoint, Universal
 from shoal.scene.loads import DistributedForce, Force, Load
 from shoal.scene.paths import key, parts, shared, unknown, unwrapped, with_lanes
 from shoal.scene.record import Record, Vector, one_line
-from shoal.scene.signals import State, check_coupling, check_signals
+from shoal.scene.sampled import Signal, refuse_apart
+from shoal.scene.signals import AnyState, check_coupling, check_signals
 from shoal.scene.solids import ModalBody
 from shoal.scene.solver import Solver
 
@@ -75,9 +76,11 @@ class Scene(Record):
     """Contacts between bodies by name."""
     loads: dict[Name, Load] = {}
     """Loads by name."""
-    signals: dict[SignalName, SignalFunction] = {}
-    """Signals by name: formulas of time, measures of the machine and other signals, which loads may follow."""
-    states: dict[SignalName, State] = {}
+    signals: dict[SignalName, Signal] = {}
+    """Signals by name: formulas of time, measures of the machine and other signals, which loads may follow; or
+    samples of these.
+    """
+    states: dict[SignalName, AnyState] = {}
     """States of controllers, actuators and other dynamics of first order, by name."""
     controllers: Annotated[dict[SignalName, Controller], Field(exclude=True)] = {}
     """Controllers by name; when a scene is read they become signals and states, which it is written with."""
@@ -307,6 +310,7 @@ class Scene(Record):
         from_ = f"{INITIAL}_{FROM}"
         values = {from_ if parts(path) == [INITIAL, FROM] else path: unwrapped(value) for path, value in values.items()}
         fresh = [path for path, value in values.items() if not self._has(path, value)]
+        refuse_apart(self, fresh)
         check_start(values.get(from_, self.initial_from), fresh)
         turned = [path for path in fresh if self._begins_there(path, values[path])]
         moved = [one for path in fresh for one in _stating(path, values[path])]

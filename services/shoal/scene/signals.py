@@ -10,15 +10,18 @@ import keyword
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import Discriminator, Tag
 
 from shoal.errors import InputError
 from shoal.scene import expression, formula
 from shoal.scene.ended import End
 from shoal.scene.formula import MEASURES, Measure, Node, leaves
-from shoal.scene.function import Function, SignalFunction
+from shoal.scene.function import SignalFunction
 from shoal.scene.joints import GROUND, Attachment, Coupling, Cylindrical, DrivenAngle, Revolute, Slider
 from shoal.scene.record import Positive, Record
+from shoal.scene.sampled import Sampled, SampledState, differences
 
 TAKEN = {"t", "pi", "e", *expression.ONE, *expression.MANY, *MEASURES}
 _MOST, _DEEPEST = 2000, 200
@@ -48,6 +51,13 @@ class StateValue:
     name: str
 
 
+@dataclass(frozen=True)
+class HeldValue:
+    """A sampled signal or state, by its name: a number between its instants."""
+
+    name: str
+
+
 class State(Record):
     """A number that obeys an equation of first order, integrated with the motion, as of a filter or an integrator."""
 
@@ -57,6 +67,12 @@ class State(Record):
     """Its value at the start [1]."""
     size: Positive = 1.0
     """What is large of it, so that it is as exact as a rate of so many SI units of the machine [1]."""
+
+
+AnyState = Annotated[
+    Annotated[State, Tag("function-rate")] | Annotated[SampledState, Tag("function-next")],
+    Discriminator(differences),
+]
 
 
 def check_signals(scene: Any) -> None:
@@ -72,7 +88,7 @@ def check_signals(scene: Any) -> None:
         raise ValueError(f"initial.from: signals and states ({fields[0]}) do not yet start at the end of a run")
     size, depth = dict[str, int](), dict[str, int]()
     for name in _order(scene.signals):
-        function = scene.signals[name]
+        function = formula_of(scene.signals[name])
         size[name], depth[name] = _extent(_tree(function), size, depth)
         if size[name] > _MOST or depth[name] > _DEEPEST:
             raise ValueError(
@@ -123,15 +139,42 @@ def check_leaves(scene: Any, where: str, function: SignalFunction) -> None:
 
 def signal_functions(scene: Any) -> Iterator[tuple[str, SignalFunction]]:
     """Yield the signals of a scene and the functions that may depend on them, with their fields."""
-    for name, function in scene.signals.items():
-        if isinstance(function, SignalFunction):  # else an array, one number a lane
-            yield f"signals.{name}", function
+    for name, one in scene.signals.items():
+        if isinstance(one, Sampled):
+            yield f"signals.{name}.sample", one.sample
+        elif isinstance(one, SignalFunction):  # else an array, one number a lane
+            yield f"signals.{name}", one
     for name, load in scene.loads.items():
         for field, value in load:
             if isinstance(value, SignalFunction):
                 yield f"loads.{name}.{field}", value
     for name, state in scene.states.items():
-        yield f"states.{name}.rate", state.rate
+        sampled = isinstance(state, SampledState)
+        yield (f"states.{name}.next", state.next) if sampled else (f"states.{name}.rate", state.rate)
+
+
+def continuous_states(scene: Any) -> dict[str, State]:
+    """Return the states that are integrated."""
+    return {name: one for name, one in scene.states.items() if isinstance(one, State)}
+
+
+def sampled_parts(scene: Any) -> dict[str, Sampled | SampledState]:
+    """Return the sampled signals, each behind those that it depends on at an instant, and then the sampled states."""
+    order = [(name, scene.signals[name]) for name in _order(scene.signals)]
+    return {name: one for name, one in [*order, *scene.states.items()] if isinstance(one, Sampled | SampledState)}
+
+
+def refuse_sampled(scene: Any, why: str) -> None:
+    """Raises InputError where a scene has sampled signals or states."""
+    for part in ("signals", "states"):
+        for name, one in getattr(scene, part).items():
+            if isinstance(one, Sampled | SampledState):
+                raise InputError(f"{part}.{name}: sampled every {one.period:g} s: {why}")
+
+
+def formula_of(signal: Any) -> Any:
+    """Return the function that is sampled of a sampled signal; any other signal itself."""
+    return signal.sample if isinstance(signal, Sampled) else signal
 
 
 def following(scene: Any) -> list[str]:
@@ -147,9 +190,13 @@ def written_out(scene: Any, function: SignalFunction, known: Mapping[str, Node] 
 
 def expanded(scene: Any) -> dict[str, Node]:
     """Return what stands in formulas for the names of signals and states."""
-    known: dict[str, Node] = {name: StateValue(name) for name in scene.states}
+    states = continuous_states(scene)
+    known: dict[str, Node] = {name: StateValue(name) if name in states else HeldValue(name) for name in scene.states}
+    known |= {name: HeldValue(name) for name, one in scene.signals.items() if isinstance(one, Sampled)}
     for name in _order(scene.signals):
         one = scene.signals[name]
+        if isinstance(one, Sampled):
+            continue
         if not isinstance(one, SignalFunction) or one.number is not None:
             known[name] = Constant(name)
         else:
@@ -161,8 +208,8 @@ def expanded(scene: Any) -> dict[str, Node]:
 
 
 def depends_on_time(scene: Any, function: SignalFunction) -> bool:
-    """Return whether any part of a function is one of time."""
-    return any(leaf == "t" or isinstance(leaf, Table) for leaf in leaves(written_out(scene, function)))
+    """Return whether any part of a function is one of time, or held over time."""
+    return any(leaf == "t" or isinstance(leaf, Table | HeldValue) for leaf in leaves(written_out(scene, function)))
 
 
 def is_of_time(node: Node) -> bool:
@@ -236,17 +283,20 @@ def _tree(function: SignalFunction) -> Node:
     return float(function.number) if function.number is not None else 0.0
 
 
-def _order(signals: Mapping[str, Function]) -> tuple[str, ...]:
-    """Return the names of signals, each behind those that it depends on. Raises ValueError for a cycle."""
+def _order(signals: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the names of signals, each behind those that it depends on at once. Raises ValueError for a cycle."""
+    late = {name for name, one in signals.items() if isinstance(one, Sampled) and one.delay > 0.0}
     graph = {
-        name: {leaf for leaf in _leaves(one) if leaf in signals} if isinstance(one, SignalFunction) else set()
-        for name, one in signals.items()
+        name: {leaf for leaf in _leaves(one) if leaf in signals} - late if isinstance(one, SignalFunction) else set()
+        for name, one in ((name, formula_of(one)) for name, one in signals.items())
     }
     try:
         return tuple(TopologicalSorter(graph).static_order())
     except CycleError as error:
         names = error.args[1][::-1]
-        raise ValueError(f"signals.{names[0]}: depends on itself: {' -> '.join(names)}") from None
+        sampled = any(isinstance(signals[name], Sampled) for name in names)
+        way = "; a state with `next` is its value before, as is a sampled signal with a delay" if sampled else ""
+        raise ValueError(f"signals.{names[0]}: depends on itself: {' -> '.join(names)}{way}") from None
 
 
 def _extent(node: Node, size: Mapping[str, int], depth: Mapping[str, int]) -> tuple[int, int]:

@@ -36,6 +36,7 @@ from shoal.mechanics.numerics.tile import SINGLE, Array, Index
 from shoal.mechanics.reach import span
 from shoal.mechanics.tangent import Tangent, damping_at, stiffness_at, tangent_tile
 from shoal.scene import Scene
+from shoal.scene.signals import continuous_states
 
 Sparse = scipy.sparse.csr_array
 _LANE = slice(0, 1)
@@ -133,7 +134,7 @@ class Evaluator:
                 "yet in reactions, virtual sensors, steady motions and starts from the end of a run"
             )
         self.model, self._strikes = model, False
-        self.states = np.arange(model.unknowns - len(model.scene.states), model.unknowns)
+        self.states = np.arange(model.unknowns - len(continuous_states(model.scene)), model.unknowns)
         self._arrays = model.tile(SINGLE, slice(lane, lane + 1))
         self._room = work_space(SINGLE, self._arrays)
         self._arrays = ready(SINGLE, self._arrays, self._room)

@@ -23,6 +23,7 @@ from shoal.mechanics.numerics.tile import Array, stacked
 from shoal.mechanics.reach import span
 from shoal.scene import Scene
 from shoal.scene.ended import End, mesh_of
+from shoal.scene.signals import refuse_sampled
 
 FITS = 1e-6
 """A state may miss the joints by so much, relative to the machine's size and speed: what a run may drift at most."""
@@ -64,6 +65,8 @@ def as_stated(scene: Scene, *, horizon: float = 0.0) -> Evaluator:
 
 def resting(model: Model) -> Model:
     """Return a model at whose start states of the user stand in place of their unknowns, as `evaluate` has them."""
+    law = "equilibria and modes are of laws in continuous time: state that one, as a signal without a period"
+    refuse_sampled(model.scene, law)
     states = slice(model.unknowns - len(model.scene.states), None)
     q, v = model.q0.copy(), np.broadcast_to(model.v0, model.q0.shape).copy()
     q[states], v[states] = v[states], 0.0

@@ -34,6 +34,7 @@ def with_start(model: Model, scene: Scene, lanes: int) -> Model:
     stated, scene = scene, placement.scene
     contacts = Contacts(scene, placement, RowAllocator(0))
     loads = Loads(scene, placement, RowAllocator(0), 0.0)
+    loads.signals.sample()
     return replace(
         model,
         scene=scene,
@@ -65,6 +66,7 @@ def build(
     loads, contacts = Loads(scene, placement, rows, horizon), Contacts(scene, placement, rows)
     loads.signals.record()
     probed = tuple(loads.signals.strength("outputs", node) for node in probes)
+    loads.signals.sample()
     gaps = contacts.gaps(placement.terms.pressed)
     if gaps.size and loads.rubbing:
         raise InputError(
@@ -128,6 +130,8 @@ def build(
         signal_fields=tuple(following(stated)),
         signal_names=tuple(loads.signals.names),
         recorded=tuple(loads.signals.outputs),
+        clocks=tuple(loads.signals.clocks.items()),
+        sampled=loads.signals.sampled,
         probed=probed,
         signal_angles=stacked(loads.signals.measures.angles),
         method=principle.method(scene.solver.acceleration),

@@ -67,7 +67,7 @@ class Loads(Measures):
             if type(load) not in LOADS:
                 raise NotImplementedError(f"the mechanics knows no load of kind {load.kind!r}")
             LOADS[type(load)](self, name, load)
-        for name, state in scene.states.items():
+        for name, state in self.signals.states.items():
             number = self._function(f"states.{name}.rate", state.rate)
             self.fixed.append((placement.states[name], STATE / state.size, number))
 

@@ -32,12 +32,13 @@ from shoal.mechanics.modal.modes import bent
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.start.start import started
 from shoal.scene import GROUND, PointMass, Rod, Scene
+from shoal.scene.signals import continuous_states
 
 
 def place(scene: Scene) -> Placement:
     """Give every body its coordinates and initial state, and state what they must satisfy. Raises InputError."""
     result = place_started(scene) if scene.dimensions == 3 else _place(scene)
-    for name, state in scene.states.items():
+    for name, state in continuous_states(scene).items():
         result.add_state(name, state.start / state.size)
     return result
 

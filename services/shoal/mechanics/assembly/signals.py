@@ -13,15 +13,37 @@ from shoal.mechanics.applied import Applied
 from shoal.mechanics.assembly.measures import ElementForceLaw, Measures
 from shoal.mechanics.forces import DISTANCE, PLACE
 from shoal.mechanics.numerics.tile import Number, index, stacked
+from shoal.mechanics.samples import FIRST_PENDING, Samples
 from shoal.mechanics.signals import Signals
 from shoal.scene import GROUND, Attachment, Function, SignalFunction, Slider
-from shoal.scene.formula import Measure, Node
+from shoal.scene.formula import Measure, Node, leaves
 from shoal.scene.function import Formula
 from shoal.scene.joints import Z
-from shoal.scene.signals import Constant, StateValue, Table, expanded, is_of_time, joint_of, place, written_out
+from shoal.scene.sampled import Clock, Sampled, SampledState
+from shoal.scene.signals import (
+    Constant,
+    HeldValue,
+    State,
+    StateValue,
+    Table,
+    continuous_states,
+    expanded,
+    is_of_time,
+    joint_of,
+    place,
+    sampled_parts,
+    written_out,
+)
 
 Operand = tuple[str, int]
 """A register: its section, and its number there."""
+
+
+def _is_held(node: Node) -> bool:
+    """Return whether a tree depends on what is held."""
+    return any(isinstance(leaf, HeldValue) for leaf in leaves(node))
+
+
 _RATES = {"rate": "angle", "slide_rate": "slide", "distance_rate": "distance"}
 _NO_LAW = ElementForceLaw()
 
@@ -48,6 +70,16 @@ class SignalLoads:
         self._code: list[tuple[int, list[Operand]]] = []
         self._switches: list[int] = []
         self._known: dict[Node, Operand] = {}
+        self._held: dict[str, int] = {}
+        self._holds: list[tuple[str, Sampled | SampledState, int, Operand]] = []
+        self._always: list[int] | None = None
+        self.clocks: dict[Clock, str] = {}
+        """Instants of samples, and the last field that follows each."""
+
+    @cached_property
+    def states(self) -> dict[str, State]:
+        """States that are integrated."""
+        return continuous_states(self.scene)
 
     @cached_property
     def _expanded(self) -> dict[str, Node]:
@@ -75,14 +107,47 @@ class SignalLoads:
 
     def record(self) -> None:
         """Record beside what loads follow all states, and those signals that are evaluated anyway."""
-        for name in self.scene.states if self._strengths else ():
+        for name in self.states if self._strengths else ():
             self.outputs[name] = self._operand(f"states.{name}", StateValue(name))
+
+    def sample(self) -> None:
+        """Add what is evaluated at samples only, of those sampled signals and states that loads depend on."""
+        parts = sampled_parts(self.scene)
+        trees = {
+            name: written_out(self.scene, one.sample if isinstance(one, Sampled) else one.next, self._expanded)
+            for name, one in parts.items()
+        }
+        ahead = list(self._held)
+        while ahead:
+            inner = {leaf.name for leaf in leaves(trees[ahead.pop()]) if isinstance(leaf, HeldValue)} - {*self._held}
+            self._held |= {name: len(self._held) + k for k, name in enumerate(sorted(inner))}
+            ahead += inner
+        continuous = self._known
+        self._always = self._sizes()
+        # What is held may change between samples of one instant, but not what else is measured.
+        self._known = {node: one for node, one in continuous.items() if not _is_held(node)}
+        for name in (name for name in parts if name in self._held):
+            one, signal = parts[name], isinstance(parts[name], Sampled)
+            field = f"signals.{name}.sample" if signal else f"states.{name}.next"
+            source = self._operand(field, trees[name])
+            self._holds.append((name, one, len(self._code), source))
+            if signal or one.clock not in self.clocks:
+                self.clocks[one.clock] = field.rpartition(".")[0]
+            self.outputs[name] = "held", self._held[name]
+        self._known |= continuous
         stated: dict[str, Any] = self.scene.signals
-        for name, one in stated.items():
-            if isinstance(one, SignalFunction) and one.number is None:
-                node = self._expanded[name]
-                if node in self._known:
-                    self.outputs[name] = self._known[node]
+        for name, each in stated.items():
+            if isinstance(each, SignalFunction) and each.number is None and self._expanded[name] in self._known:
+                self.outputs[name] = self._known[self._expanded[name]]
+
+    @property
+    def sampled(self) -> tuple[str, ...]:
+        """Names of what is sampled."""
+        return tuple(name for name, _, _, _ in self._holds)
+
+    def _sizes(self) -> list[int]:
+        places, rates = self._rows["position"], self._rows["velocity"]
+        return [len(self.measures.kinds), len(places), len(rates), len(self._functions), len(self._code)]
 
     def turn(self, name: str, first: Attachment, second: Attachment, strength: int) -> None:
         """Let a torque of the plane follow a strength."""
@@ -97,6 +162,7 @@ class SignalLoads:
             "measure": 2 * len(self.measures.kinds),
             **{kind: len(rows) for kind, rows in self._rows.items()},
             "function": len(self._functions),
+            "held": len(self._held),
             "constant": len(self._constants),
         }
         base = dict(zip([*sizes, "result"], np.cumsum([0, *sizes.values()]).tolist(), strict=True)) | {"switch": 0}
@@ -127,9 +193,25 @@ class SignalLoads:
             len(self._switches),
             index([register(one) for one in self.outputs.values()]),
             len(self.outputs),
+            index(self._always or self._sizes()),
+            self._samples(register),
             applied(lambda strength: strengths[strength]),
             turned,
         )
+
+    def _samples(self, register: Callable[[Operand], int]) -> Samples:
+        """Return what is sampled as arrays."""
+        rows, numbers, pending = [], [*self.clocks], FIRST_PENDING
+        for name, one, end, source in self._holds:
+            late = isinstance(one, SampledState) or one.clock.delay > 0
+            flying = one.clock.flying if one.clock.delay else 1 if late else 0
+            target = register(("held", self._held[name]))
+            rows.append([end, register(source), target, numbers.index(one.clock), pending, flying, one.clock.delay > 0])
+            pending += flying + 2 if late else 0
+        starts = {self._held[name]: getattr(one, "start", 0.0) for name, one, _, _ in self._holds}
+        quanta = [getattr(one, "quantum", None) or 0.0 for _, one, _, _ in self._holds]
+        begin = stacked([starts[k] for k in range(len(starts))])
+        return Samples(len(rows), index(rows).ravel(), stacked(quanta), len(starts), begin, pending)
 
     def _operand(self, field: str, node: Node) -> Operand:
         if node not in self._known:
@@ -146,6 +228,8 @@ class SignalLoads:
             return self._measure(node)
         if isinstance(node, StateValue):
             return self._state(field, node.name)
+        if isinstance(node, HeldValue):
+            return "held", self._held.setdefault(node.name, len(self._held))
         if isinstance(node, Table) or is_of_time(node):
             function = self.scene.signals[node.name] if isinstance(node, Table) else Formula(node)
             self._functions.append(self._fit(field, function))
@@ -157,7 +241,9 @@ class SignalLoads:
             self._code.append((tape.MULTIPLY_ADD, [self._operand(field, part) for part in factors]))
         else:
             operands, number = [self._operand(field, part) for part in parts], tape.CODES[operation]
-            if number in tape.SWITCHES:  # whose last entry is their number
+            if number in tape.SWITCHES and self._always is not None:  # no step ends there
+                operands = [operands[0], operands[-1], ("switch", 0)]
+            elif number in tape.SWITCHES:  # whose last entry is their number
                 operands = [operands[0], operands[-1], ("switch", len(self._switches))]
                 self._switches.append(len(self._code))
             self._code.append((number, operands))
@@ -165,7 +251,7 @@ class SignalLoads:
 
     def _state(self, field: str, name: str) -> Operand:
         """The rate of the unknown of a state, times the size of that."""
-        size = self.scene.states[name].size
+        size: Number = self.states[name].size
         self._rows["velocity"].append(self.measures.placement.states[name])
         rate = "velocity", len(self._rows["velocity"]) - 1
         if np.ndim(size) == 0 and size == 1.0:

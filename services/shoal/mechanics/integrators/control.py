@@ -49,8 +49,8 @@ def control_room(solver: Solver, tile: Tile) -> Control:
 
 
 @njit(cache=True, error_model="numpy")
-def begin(tile: Tile, m: Arrays, w: Work, c: Control) -> bool:
-    """Keep the state in w.before and see which lanes are numbers; false if none is."""
+def begin(tile: Tile, m: Arrays, w: Work, c: Control, t: float) -> bool:
+    """Keep the state in w.before and see which lanes are numbers at the time t; false if none is."""
     width = len(tile)
     end = m.unknowns * width
     for i in range(end):
@@ -61,6 +61,8 @@ def begin(tile: Tile, m: Arrays, w: Work, c: Control) -> bool:
         for i in range(lane, end, width):
             nothing += 0.0 * (w.z[i] + w.zdot[i] + w.a[i])
         c.alive[lane] = 1.0 if nothing == 0.0 else 0.0
+        if nothing != 0.0 and w.gauss.ended[lane] < 0.0:
+            w.gauss.ended[lane] = t
         any_alive = any_alive or c.alive[lane] > 0.0
     return any_alive
 

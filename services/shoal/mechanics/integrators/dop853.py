@@ -120,7 +120,7 @@ def step(tile: Tile, scheme: Dop853, m: Arrays, w: Work, t: float, h: float) -> 
     rest, room = h, raw(scheme)
     c = room.control
     room.begin[0], room.dense[0] = t, 0.0
-    if not control.begin(tile, m, w, c):
+    if not control.begin(tile, m, w, c, t):
         return rest
     _keep(tile, room, m, 0, w.zdot, w.a)
     h = control.first_trial(c, rest)

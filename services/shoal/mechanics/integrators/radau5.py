@@ -387,7 +387,7 @@ def step(tile: Tile, scheme: Radau5, m: Arrays, w: Work, t: float, h: float) -> 
     rest, room = h, raw(scheme)
     end = m.unknowns * len(tile)
     c = room.control
-    if not control.begin(tile, m, w, c):
+    if not control.begin(tile, m, w, c, t):
         return rest
     for i in range(end):
         room.slope[i] = w.a[i]
