@@ -448,3 +448,29 @@ def test_an_accepted_step_damps_and_does_not_excite(integrator: str) -> None:
     run = simulate(_with(DAMPED, integrator, 0.999 * limit), np.array([20.0]))
     # The first order is stable there, but at its limit the new rate is the old one turned round.
     assert run.angle("R")[0] == pytest.approx(0.01, abs=5e-3 if facts(integrator).order > 1 else 2.2e-2)
+
+
+@pytest.mark.parametrize("integrator", [name for name in INTEGRATORS if not facts(name).adaptive])
+@pytest.mark.parametrize("late", [1e-13, 1e-11, 1e-9, 1e-7])
+def test_a_step_may_be_cut_as_short_as_a_jump_asks(integrator: str, late: float) -> None:
+    """Accelerations as differences of places over the square of such a step would be round-off."""
+    rod = {"kind": "rod", "length": 0.5, "height": 0.02, "width": 0.02, "density": 7850.0}
+    data = {
+        "name": "jump",
+        "bodies": {"one": rod, "two": rod},
+        "joints": {
+            "O": {"kind": "revolute", "first": {"body": "ground", "point": [0.3, 0.1]}, "second": {"body": "one"}},
+            "A": {"kind": "revolute", "first": {"body": "one", "point": "end"}, "second": {"body": "two"}},
+        },
+        "markers": {"tip": {"body": "two", "point": "end"}},
+        "loads": {"motor": {"kind": "torque", "at": {"body": "two"}, "torque": f"4*step(t - 0.1 - {late!r})"}},
+        "initial": {"one": {"angle": 0.5}, "two": {"angle": -0.8}},
+    }
+    step = 1e-4 if facts(integrator).order == 1 else 1e-3
+    runs = [
+        simulate(Scene.parse({**data, "solver": {"integrator": name, "step": step, "duration": 0.3}}), np.array([0.3]))
+        for name in (integrator, "dop853")
+    ]
+    assert runs[0].ok, runs[0].message
+    bound = 10.0 * step if facts(integrator).order == 1 else 100.0 * step**2
+    np.testing.assert_allclose(runs[0].marker("tip"), runs[1].marker("tip"), atol=bound)

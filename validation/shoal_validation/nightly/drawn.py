@@ -1,15 +1,18 @@
-"""The line of machines with contacts drawn at random: none may be wrong and called right."""
+"""Lines of machines drawn at random, with contacts and under feedback: none may be wrong and called right."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 
 import numpy as np
 
 from shoal_validation.benchmarks.timing import undisturbed
 from shoal_validation.nightly.line import Line
 from shoal_validation.nightly.measure import Measured
-from shoal_validation.random_contacts.study import WRONG, judged
+from shoal_validation.random_contacts.study import judged as with_contacts
+from shoal_validation.random_feedback.study import judged as under_feedback
+from shoal_validation.random_machines import WRONG, Judged
 
 SEEDS = range(24)
 LEAST = len(SEEDS) // 2
@@ -17,13 +20,17 @@ LEAST = len(SEEDS) // 2
 
 
 def lines() -> Iterator[Line]:
-    """One line."""
+    """One line for each study."""
     reason = "no machine may be further from the judge than three times its estimated error"
-    source = "Newton's and Euler's equations, every mode of contacts tried"
-    yield Line("random/contacts", "gauss", "default", 0.0, reason, wrong, source, "machines", quick=False, noise=0.5)
+    for name, judged, source in (
+        ("contacts", with_contacts, "Newton's and Euler's equations, every mode of contacts tried"),
+        ("feedback", under_feedback, "Lagrange's equations, formulas by Python, DOP853 of scipy"),
+    ):
+        yield Line(f"random/{name}", "gauss", "default", 0.0, reason, partial(wrong, judged), source,
+                   "machines", quick=False, noise=0.5)  # fmt: skip
 
 
-def wrong() -> Measured:
+def wrong(judged: Callable[[int], Judged]) -> Measured:
     """Return how many machines are wrong and called right, as the error; failed if few are judged right."""
     seconds, found = undisturbed(lambda: [judged(seed) for seed in SEEDS])
     verdicts = [one.verdict for one in found]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from shoal.engines import get_engine
 from shoal.engines.verification import verified
@@ -12,25 +10,13 @@ from shoal.scene import Scene
 
 from shoal_validation.random_contacts.machines import DURATION, drawn
 from shoal_validation.random_contacts.newton_euler import NewtonEuler, UndecidedError
+from shoal_validation.random_machines import WRONG, Judged
 
-WRONG = "wrong and called right"
 IMPACTS = 12
 """A machine is followed up to so many impacts, as each makes differences grow."""
 KNOWN = 1e-8
 """Error of the judge [m]: its tolerance of 1e-12 after `IMPACTS`; found are differences up to 4e-10."""
 TIMES = np.linspace(0.0, DURATION, 61)[1:]
-
-
-@dataclass(frozen=True)
-class Judged:
-    """A verdict: right, wrong and called right, refused, or not judged; and what it is about."""
-
-    seed: int
-    verdict: str
-    text: str
-
-    def __str__(self) -> str:
-        return f"{self.seed:4d} {self.verdict:22s} {self.text}"
 
 
 def judged(seed: int) -> Judged:

@@ -64,9 +64,10 @@ class Facts(NamedTuple):
 
 
 class Scheme(NamedTuple):
-    """An integrator as the time loop sees it: addresses of its kernels, storage of its settings, and two of its facts.
+    """An integrator as the time loop sees it: addresses of its kernels, storage of its settings, and some of its facts.
 
-    forget: 0 where there are no earlier steps to forget. evaluations: the counter of the settings.
+    forget: 0 where there are no earlier steps to forget. divides: whether its equations are divided by the square of
+    its fixed step, so that a very short one is but round-off. evaluations: the counter of the settings.
     """
 
     advance: int
@@ -74,6 +75,7 @@ class Scheme(NamedTuple):
     forget: int
     adaptive: bool
     averages: bool
+    divides: bool
     settings: Array
     evaluations: Array
 
@@ -110,7 +112,9 @@ def connect(tile: Tile, settings: Any, arrays: Arrays, room: Work) -> Scheme:
         return kernels.address(key, lambda: signatures(tile, settings, arrays, room)[number])
 
     step, inside, forget = (address(k) if own[k] else 0 for k in range(3))
-    return Scheme(step, inside, forget, own.facts.adaptive, own.facts.mean_power, storage, settings.evaluations)
+    divides = not (own.facts.explicit or own.facts.adaptive)
+    facts = own.facts.adaptive, own.facts.mean_power, divides
+    return Scheme(step, inside, forget, *facts, storage, settings.evaluations)
 
 
 def signatures(tile: Tile, settings: Any, arrays: Arrays, room: Work) -> list[Kernel]:
