@@ -30,6 +30,7 @@ SI: dict[str, float] = {
     **{"N m": 1.0, "mN m": 1e-3, "N mm": 1e-3},
     **{"m/m": 1.0, "um/m": 1e-6, "%": 1e-2},
     **{"s": 1.0, "ms": 1e-3, "us": 1e-6},
+    "1": 1.0,
 }
 """What a unit is in those of SI; of a picture element the recording's `scale` tells the size."""
 TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0}

@@ -30,7 +30,6 @@ from shoal.engines import get_engine
 from shoal.errors import InputError, UnstableStepError
 from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.analysis.modes import modes
-from shoal.mechanics.analysis.reactions import reactions
 from shoal.mechanics.analysis.statics import statics
 from shoal.mechanics.assembly.build import build
 from shoal.mechanics.simulate import simulate
@@ -421,7 +420,7 @@ def test_derivatives_of_loads_that_follow_signals(dimensions: int) -> None:
             "scale": "sin(u1) + distance(hand, elbow)**2 + distance_rate(hand, ground) + position(hand, y)",
         }  # fmt: skip
     model = build(Scene.parse(data), horizon=1.0)
-    evaluator = Evaluator(model, signals=True)
+    evaluator = Evaluator(model)
     rng, n = np.random.default_rng(3), model.unknowns
     q = model.q0[:, 0] + 0.05 * rng.standard_normal(n)
     none, h = np.zeros(n), 1e-6
@@ -432,14 +431,6 @@ def test_derivatives_of_loads_that_follow_signals(dimensions: int) -> None:
     for found, exact in ((evaluator.stiffness(q), stiffness), (evaluator.damping(q), damping)):
         assert found.toarray() == pytest.approx(exact, abs=1e-6 * np.max(np.abs(exact)))
     assert np.max(np.abs(stiffness - stiffness.T)) > 1e-3 * np.max(np.abs(stiffness))
-
-
-def test_what_knows_no_signals_says_so() -> None:
-    scene = Scene.parse(pendulum())
-    with pytest.raises(InputError, match=r"loads.motor.torque: signals and states are known in motions"):
-        reactions(scene)
-    with pytest.raises(InputError, match=r"loads.motor.torque: steady motions take no signals"):
-        modes(scene.with_values({"initial.arm.rate": 1.0}))
 
 
 def test_what_a_swarm_cannot_weigh_is_refused() -> None:

@@ -37,7 +37,7 @@ def of_measurement(measurement: Measurement) -> list[Data]:
 
 
 def _of(name: str, recording: Recording) -> Data:
-    channels = [channel.signal for channel in recording.channels]
+    channels = [channel.label for channel in recording.channels]
     digest = _digest(recording)
     columns = [{"type": "double", "name": column, "required": True} for column in ("t", *channels)]
     told = {"num_rows": len(recording.times), "num_elements": int(recording.values.size)}
@@ -55,7 +55,7 @@ def _digest(recording: Recording, *held: HeldOut) -> str:
     times = np.concatenate([part.times for part in parts])
     values = np.concatenate([part.values for part in parts])
     order = np.argsort(times, kind="stable")
-    digest = hashlib.sha256(repr(([channel.signal for channel in recording.channels], values.shape)).encode())
+    digest = hashlib.sha256(repr(([channel.label for channel in recording.channels], values.shape)).encode())
     digest.update(times[order].tobytes() + values[order].tobytes())
     return digest.hexdigest()[:16]
 

@@ -159,7 +159,7 @@ def _log_result(run: Run, fit: Fit) -> None:
     run.metric("final/trusted", float(estimate.verdict.trusted))
     run.metric("final/residual_autocorrelation", estimate.residual_autocorrelation)
     for signal in signals(estimate):
-        run.metric(f"rms/{signal.recording}/{signal.channel.signal}", signal.rms)
+        run.metric(f"rms/{signal.recording}/{signal.channel.label}", signal.rms)
     for name, value in {**estimate.parameters, **estimate.quantities}.items():
         run.metric(f"final/{name}", value.value)
         run.metric(f"interval/{name}/lower", value.lower)

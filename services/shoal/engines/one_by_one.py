@@ -81,7 +81,7 @@ def _side_by_side(runs: Sequence[Trajectory], wall_s: float) -> Trajectory:
     states = [run.states for run in runs]
     first = next((one for one in states if one is not None), None)
     if first is not None:
-        fields = ("q", "v", "contacts")
+        fields = ("q", "v", "contacts", "signals")
         first = first._replace(**{field: known([getattr(one, field, None) for one in states]) for field in fields})
     return replace(
         runs[0],

@@ -296,6 +296,9 @@ class Problem(Record):
                 if marker is not None and marker not in scene.markers:
                     known = ", ".join(scene.markers)
                     raise InputError(f"{where}: channels: no marker {marker!r}; there are {known}")
+            if channel.signal is not None and channel.signal not in {**scene.signals, **scene.states}:
+                known = ", ".join([*scene.signals, *scene.states]) or "none"
+                raise InputError(f"{where}: channels: no signal or state {channel.signal!r}; there are {known}")
             if channel.quantity in IN_SPACE and scene.dimensions == 2:
                 raise InputError(
                     f"{where}: channels: {channel.quantity} is measured in space; {scene.name} is a scene in the plane"

@@ -15,6 +15,7 @@ from shoal.identification.diagnostics.minima.search import with_other_minima
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods import Method, Outcome
 from shoal.identification.methods.starts import starting_points
+from shoal.scene.function import Function
 from shoal.trajectory import Array
 
 Watch = Callable[[int, float, float, int], None]
@@ -26,6 +27,8 @@ def assembled(model: ForwardModel) -> tuple[ForwardModel, list[str]]:
     sought = dict(model.problem.parameters)
     for name, parameter in sought.items():
         own = None if parameter.path is None or parameter.of_measurement else model.scene.value(parameter.path)
+        if isinstance(own, Function):
+            own = own.number
         if parameter.start is None and own is not None and parameter.lower <= own <= parameter.upper:
             sought[name] = parameter.model_copy(update={"start": float(own)})
     begun = [name for name, parameter in sought.items() if parameter is not model.problem.parameters[name]]

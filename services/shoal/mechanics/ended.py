@@ -22,7 +22,8 @@ from shoal.scene.ended import BodyState, End, mesh_of
 class Ended(Mapping[str, Any]):
     """The state as `End` has it, in plain data, worked out when it is asked for.
 
-    q, v: coordinates and rates, each (unknowns,); turns: of force elements, angles: of the markers [rad].
+    q, v: coordinates and rates, each (unknowns,); turns: of force elements and then of the measures of signals, angles:
+    of the markers [rad].
     time: of the end [s].
     """
 
@@ -57,7 +58,14 @@ class Ended(Mapping[str, Any]):
             )
         turns = named_turns(self.model, self.turns)
         angles = dict(zip(scene.markers, self.angles.tolist(), strict=True))
-        return End.model_construct(t=self.time, bodies=bodies, turns=turns, angles=angles).model_dump(mode="json")
+        sizes = [float(state.size) for state in scene.states.values()]
+        values = self.v[len(self.v) - len(sizes) :] * sizes
+        states = dict(zip(scene.states, values.tolist(), strict=True))
+        counted = dict(zip(measured(self.model), self.turns[self.model.forces.size :].tolist(), strict=True))
+        end = End.model_construct(
+            t=self.time, bodies=bodies, turns=turns, angles=angles, states=states, measures=counted
+        ).model_dump(mode="json")
+        return {field: value for field, value in end.items() if value or field not in ("states", "measures")}
 
     def __reduce__(self) -> tuple[Any, ...]:
         # A model holds addresses of this process.
@@ -84,6 +92,15 @@ def start_angles(model: Model, named: Sequence[Mapping[str, Sequence[float]]]) -
         for name, number in counting:
             angles[number, lane] = next(left.get(name, iter(())), angles[number, lane])
     return angles
+
+
+def measured(model: Model) -> list[str]:
+    """Return the names of the measures of signals, in their order."""
+    if not model.signals:
+        return []
+    loads = Loads(model.stated, place(model.stated), RowAllocator(0), 0.0)
+    loads.signals.record()
+    return loads.signals.measures.names
 
 
 def _counting(model: Model) -> list[tuple[str, int]]:

@@ -203,7 +203,7 @@ def linearize(
     users = tuple(StateValue(name) for name in scene.states)
     rates = (Measure(RATES[one.kind], one.names) for one in places)
     asked = (*places, *rates, *users, *(_formula(opened, output) for output in outputs))
-    evaluator = Evaluator(Machine.of(opened).probed(asked, time), one_sided=True, signals=True)
+    evaluator = Evaluator(Machine.of(opened).probed(asked, time), one_sided=True)
     state = _state_of(scene, about, time)
     for pose in state.way:
         evaluator.remember(pose)
@@ -286,7 +286,7 @@ def _state_of(scene: Scene, about: str, time: float) -> _State:
             balance, equilibrium.q, [*doubts, *(one for one in remarks if one.text not in equilibrium.message)]
         )
     model = begun(Machine.of(scene).model(time))
-    evaluator = Evaluator(resting(model), one_sided=True, signals=True)
+    evaluator = Evaluator(resting(model), one_sided=True)
     if about == "start" and not is_moving(evaluator, time):
         balance = Balance(evaluator, time, span(scene), sum(float(body.mass) for body in scene.bodies.values()))
         q, gap = balance.restore(evaluator.model.q0[:, 0].copy())
@@ -298,7 +298,7 @@ def _state_of(scene: Scene, about: str, time: float) -> _State:
             )
         if balance.residual(view := balance.look(q)) <= BALANCED and not balance.restless(q, view):
             return _resting(balance, q, remarks)
-    evaluator = Evaluator(model, one_sided=True, signals=True)
+    evaluator = Evaluator(model, one_sided=True)
     if evaluator.gaps.size and np.all(evaluator.gaps.kind == DRY):
         raise InputError(
             f"{evaluator.model.gap_fields[0]}: a joint that sticks has no linear model in motion or out of balance; "

@@ -15,18 +15,20 @@ from shoal.mechanics.numerics.tile import Array, Index
 class States(NamedTuple):
     """States of the lanes of a model at sampled times: coordinates and rates, (samples, unknowns, lanes) each.
 
-    contacts: what they do from that time on, see `gaps.keep`, (samples, contacts, KEPT, lanes)
+    contacts: what they do from that time on, see `gaps.keep`, (samples, contacts, KEPT, lanes); signals: those that the
+    model records, (samples, signals, lanes)
     """
 
     model: Model
     q: Array
     v: Array
     contacts: Array
+    signals: Array
 
     @classmethod
     def room(cls, model: Model, samples: int) -> States:
         """Not filled yet."""
-        shapes = (model.unknowns,), (model.unknowns,), (model.gaps.size, KEPT)
+        shapes = (model.unknowns,), (model.unknowns,), (model.gaps.size, KEPT), (len(model.recorded),)
         return cls(model, *(np.full((samples, *shape, model.lanes), np.nan) for shape in shapes))
 
 
@@ -47,6 +49,8 @@ def split(record: Marched, states: States, width: int, part: slice) -> Marched:
         numbers = samples[:, markers:, first : first + d, :lanes]
         found[..., part] = numbers.reshape(len(found), -1, lanes)[:, : model.unknowns]
     states.contacts[..., part] = record.contacts.reshape(*states.contacts.shape[:3], width)[..., :lanes]
+    if record.signals.size:
+        states.signals[..., part] = record.signals.reshape(*states.signals.shape[:2], width)[..., :lanes]
     return record._replace(samples=samples[:, :markers].ravel())
 
 

@@ -176,9 +176,13 @@ class Workspace:
 
     @property
     def left(self) -> tuple[Array, Array, Array]:
-        """Coordinates and rates at the last sampling time, and the turns of angle forces, of a march of one lane."""
-        frame, n = self.march.frame, self._model.unknowns
-        return frame.own.q[:n].copy(), frame.own.v[:n].copy(), frame.room.memory.copy()
+        """Coordinates and rates at the last sampling time, and the turns of angle forces, of a march of one lane.
+
+        Behind these are those of the measures of signals.
+        """
+        frame, n, signals = self.march.frame, self._model.unknowns, self._model.signals
+        turns = np.append(frame.room.memory, frame.room.signals[: signals.measures.size if signals else 0])
+        return frame.own.q[:n].copy(), frame.own.v[:n].copy(), turns
 
     def run(self, model: Model, part: slice, stop: Event | None = None) -> Marched:
         """The record of a march from the start of a model that differs in its start only; good until the next one.

@@ -49,6 +49,10 @@ class End(Record):
     """Angles that joints and loads have counted, in their order [rad]."""
     angles: dict[str, float] = {}
     """Directions of markers, counted over full turns [rad]."""
+    states: dict[str, float] = {}
+    """Values of states of the user."""
+    measures: dict[str, float] = {}
+    """Angles that signals measure, such as `angle(hinge)`, counted over full turns [rad]."""
 
     def check(self, bodies: Mapping[str, Any]) -> None:
         """Raises ValueError, one line, where it is that of other bodies."""

@@ -125,6 +125,12 @@ class Function(Record):
         """Times between which a table is one polynomial [s]; none for an expression."""
         return tuple(time for time, _ in self.table or ())
 
+    def __float__(self) -> float:
+        """The number that it is. Raises TypeError of expressions and tables."""
+        if self.number is None:
+            raise TypeError("a function of time is no number")
+        return float(self.number)
+
     def through(self, *operations: str) -> Composed:
         """Operations of `formula` on the function's value, in their order."""
         return Composed(self, operations)

@@ -16,7 +16,6 @@ from pydantic import Discriminator, Tag
 
 from shoal.errors import InputError
 from shoal.scene import expression, formula
-from shoal.scene.ended import End
 from shoal.scene.formula import MEASURES, Measure, Node, leaves
 from shoal.scene.function import SignalFunction
 from shoal.scene.joints import GROUND, Attachment, Coupling, Cylindrical, DrivenAngle, Revolute, Slider
@@ -84,8 +83,6 @@ def check_signals(scene: Any) -> None:
             raise ValueError(f"states.{name}: there is a signal of this name; use another one")
     for where, function in signal_functions(scene):
         check_leaves(scene, where, function)
-    if isinstance(scene.initial_from, End) and (fields := [*following(scene), *scene.states]):
-        raise ValueError(f"initial.from: signals and states ({fields[0]}) do not yet start at the end of a run")
     size, depth = dict[str, int](), dict[str, int]()
     for name in _order(scene.signals):
         function = formula_of(scene.signals[name])

@@ -74,4 +74,4 @@ def _signals(recording: Recording, fitted: Array, seen: Array) -> Iterator[tuple
         stated = float(recording.noise[k])
         estimated = max(float(np.sqrt(np.nanmean(left[:, k] ** 2))), ACCURACY * float(np.ptp(fitted[:, k])))
         away = float(np.sqrt(np.mean((seen[:, k] - fitted[:, k]) ** 2)))
-        yield channel.signal, away, stated if np.isfinite(stated) else estimated, QUANTITIES[channel.quantity]
+        yield channel.label, away, stated if np.isfinite(stated) else estimated, QUANTITIES[channel.quantity]

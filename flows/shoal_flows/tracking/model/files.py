@@ -130,5 +130,5 @@ def _table(recording: Recording) -> str:
 
 def _columns(recording: Recording) -> list[str]:
     """A name for each channel; those that show the same in another way are numbered."""
-    names = [channel.signal for channel in recording.channels]
+    names = [channel.label for channel in recording.channels]
     return [f"{name}-{k}" if names.count(name) > 1 else name for k, name in enumerate(names)]

@@ -41,6 +41,7 @@ Quantity = Literal[
     "friction",
     "impact",
     "strain",
+    "signal",
 ]
 ACCELERATIONS: tuple[Quantity, ...] = ("ax", "ay", "az")
 RATES: tuple[Quantity, ...] = ("wx", "wy", "wz")
@@ -50,6 +51,8 @@ MOMENTS: tuple[Quantity, ...] = ("mx", "my", "mz")
 STRAIN: Quantity = "strain"
 PRESSING: tuple[Quantity, ...] = ("normal", "friction")
 """What a load cell below a contact shows along its normal and across it."""
+SIGNAL: Quantity = "signal"
+"""A signal or a state of the scene, as a controller logs it, in the unit of its formula."""
 IMPACT: Quantity = "impact"
 """The times of impacts, as a microphone hears them, one a row."""
 REACTIONS: tuple[Quantity, ...] = (*FORCES, *MOMENTS, "torque", *PRESSING)
@@ -64,6 +67,7 @@ _UNITS: dict[str, Any] = {
     **dict.fromkeys((*MOMENTS, "torque"), TorqueUnit),
     STRAIN: StrainUnit,
     IMPACT: TimeUnit,
+    SIGNAL: Literal["1"],
 }
 
 
@@ -85,6 +89,8 @@ class Channel(Record):
     strain: of a flexible rod along its axis, at a marker and a `height` above the axis, in space a `side` of it
     towards the local z axis too [m].
 
+    signal: the name of a signal or a state of the scene, in the unit of its formula.
+
     With `to`, an angle or rate is that of the marker's body less that of the body at another marker: of a joint between
     them, what its encoder shows. Neither tilts with the camera.
 
@@ -98,7 +104,8 @@ class Channel(Record):
     marker: str = ""
     joint: str | None = None
     contact: str | None = None
-    quantity: Quantity
+    signal: str | None = None
+    quantity: Quantity = SIGNAL
     to: str | None = None
     tilt: Angle | tuple[Angle, Angle, Angle] = 0.0
     height: float = 0.0
@@ -113,18 +120,27 @@ class Channel(Record):
     @model_validator(mode="after")
     def _unit_of_its_quantity(self) -> Self:
         right = units_of(self.quantity)
+        if self.quantity == SIGNAL and self.unit is not None:
+            raise ValueError("unit: a signal has that of its formula; use scale")
         if self.unit is not None and self.unit not in right:
             raise ValueError(f"unit: {self.quantity} is measured in one of {', '.join(right)}, found {self.unit!r}")
         return self
 
     @model_validator(mode="after")
     def _somewhere(self) -> Self:
-        named = [field for field in ("marker", "joint", "contact") if getattr(self, field)]
+        named = [field for field in ("marker", "joint", "contact", "signal") if getattr(self, field)]
+        if self.quantity == SIGNAL or self.signal:
+            if named != ["signal"] or self.quantity != SIGNAL:
+                quantities = ", ".join(one for one in get_args(Quantity) if one != SIGNAL)
+                raise ValueError(f"quantity: name a `signal` and nothing else, or state what is measured: {quantities}")
+            named = []
+        elif not named:
+            named = ["none"]
         in_joints, at_contacts = (*FORCES, *MOMENTS, "torque", IMPACT), (*FORCES, *PRESSING, IMPACT)
         places = ["in a joint"] * (self.quantity in in_joints) + ["at a contact"] * (self.quantity in at_contacts)
         places = places or ["at a marker"]
         kinds = [one.rsplit(maxsplit=1)[-1] for one in places]
-        if len(named) != 1 or named[0] not in kinds:
+        if named and (len(named) != 1 or named[0] not in kinds):
             other = "joint" if kinds == ["marker"] else "marker"
             where = " or ".join(places)
             raise ValueError(f"{kinds[0]}: {self.quantity} is measured {where}; name it, and no {other}")
@@ -159,18 +175,21 @@ class Channel(Record):
 
     @property
     def place(self) -> str:
-        """The marker, the joint or the contact."""
-        return self.joint or self.contact or self.marker
+        """The marker, the joint, the contact or the signal."""
+        return self.joint or self.contact or self.signal or self.marker
 
     @property
-    def signal(self) -> str:
+    def label(self) -> str:
         """Place and kind, as columns and charts name it."""
         return f"{self.place}.{self.kind}"
 
     @property
     def is_sensor(self) -> bool:
-        """Return whether a sensor on the machine shows it that knows no camera: of acceleration, force or strain."""
-        return self.quantity in (*ACCELERATIONS, *RATES, *REACTIONS, STRAIN, IMPACT)
+        """Return whether a sensor on the machine shows it that knows no camera: of acceleration, force or strain.
+
+        Signals are those of a sensor as well.
+        """
+        return self.quantity in (*ACCELERATIONS, *RATES, *REACTIONS, STRAIN, IMPACT, SIGNAL)
 
     @property
     def is_dynamic(self) -> bool:

@@ -20,6 +20,7 @@ QUANTITIES = {
     "impact": "s",
     **dict.fromkeys(("mx", "my", "mz", "torque"), "N m"),
     "strain": "m/m",
+    "signal": "",
 }
 """Of what a channel measures."""
 _FIELDS = {
@@ -124,6 +125,8 @@ def with_units(
 def _unit(channel: Channel, units: Units) -> str:
     """The unit of a channel's column, as a channel states it; empty where its table names none."""
     allowed = units_of(channel.quantity)
+    if channel.signal is not None:
+        return ""
     found = []
     for column in (channel.column, channel.origin):
         text = units.of.get(column, "") if column else ""

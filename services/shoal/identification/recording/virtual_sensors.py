@@ -20,6 +20,7 @@ from shoal.identification.recording.source import (
     PRESSING,
     RATES,
     REACTIONS,
+    SIGNAL,
     STRAIN,
     Channel,
 )
@@ -44,13 +45,15 @@ def from_start(times: Array, channels: tuple[Channel, ...]) -> Array:
 
 
 def needs_states(scene: Scene, channels: tuple[Channel, ...]) -> bool:
-    """Return whether sensors of some channels need more than the motion of bodies: the machine bends, touches or is in
-    space.
+    """Return whether sensors of some channels need more than the motion of bodies: the machine bends, touches, is in
+    space or has states, or they show signals.
     """
+    if any(channel.quantity == SIGNAL for channel in channels):
+        return True
     if scene.dimensions == 3:
         return any(channel.is_sensor for channel in channels)
     bends = any(body.element != "rigid" for body in scene.bodies.values())
-    return (bends or scene.touches) and any(channel.is_dynamic for channel in channels)
+    return (bends or scene.touches or bool(scene.states)) and any(channel.is_dynamic for channel in channels)
 
 
 def engine_options(engine: Engine, scene: Scene, channels: tuple[Channel, ...]) -> dict[str, bool]:
@@ -59,7 +62,7 @@ def engine_options(engine: Engine, scene: Scene, channels: tuple[Channel, ...]) 
         return {}
     if not isinstance(engine, GaussEngine):
         quantity = next(channel.quantity for channel in channels if channel.is_sensor)
-        where = "in space" if scene.dimensions == 3 else "of a machine that bends or touches"
+        where = "in space" if scene.dimensions == 3 else "of a machine that bends, touches or has signals or states"
         raise InputError(f"channels: {quantity} {where} is computed by the engine gauss alone; found {engine.name}")
     return {"whole": True}
 
@@ -105,6 +108,11 @@ def sensor_channels(
         raise InputError(f"channels: {channels[numbers[0]].quantity} cannot be computed from a motion alone")
     planar = scene.dimensions == 2
     found = {k: _strain(trajectory, scene, channels[k]) for k in numbers if planar and channels[k].quantity == STRAIN}
+    followed = [k for k in numbers if channels[k].quantity == SIGNAL]
+    if followed:
+        names = tuple(dict.fromkeys(str(channels[k].signal) for k in followed))
+        courses = _signals(trajectory, scene, values, names)
+        found |= {k: courses[names.index(str(channels[k].signal))] for k in followed}
     dynamic = [k for k in numbers if k not in found]
     if not dynamic:
         return found
@@ -122,6 +130,17 @@ def sensor_channels(
         for k, signal in _of_lane(one, scene, channels, dynamic, joints, turned[views]).items():
             found[k][:, views] = signal
     return found
+
+
+def _signals(trajectory: Trajectory, scene: Scene, values: Mapping[str, Array], names: tuple[str, ...]) -> Array:
+    """Signals and states along a motion, by their names, (names, samples, lanes); nan where a lane failed."""
+    from shoal.mechanics.analysis.signals_along import signals_along  # slow to import
+
+    states = trajectory.states
+    if states is None:
+        raise InputError(f"channels: signal {names[0]} needs all coordinates, which this motion does not tell")
+    alone = scene.alone(values) is not None
+    return signals_along(states, trajectory.times, scene, values if alone else {}, names)
 
 
 def _by_states(

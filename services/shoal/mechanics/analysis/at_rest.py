@@ -44,7 +44,7 @@ def at_start(scene: Scene, *, horizon: float = 0.0) -> Evaluator:
 
     Raises InputError if the scene cannot be modelled, or its start as `begun` does.
     """
-    return Evaluator(resting(begun(Machine.of(scene).model(horizon))), one_sided=True, signals=True)
+    return Evaluator(resting(begun(Machine.of(scene).model(horizon))), one_sided=True)
 
 
 def _equilibrium(scene: Scene) -> Equilibrium:

@@ -14,7 +14,7 @@ from shoal.findings import Concluded, Finding, Kind
 from shoal.mechanics.analysis import left_out
 from shoal.mechanics.analysis import modes_findings as kinds
 from shoal.mechanics.analysis.going_on import as_stated
-from shoal.mechanics.analysis.modes import ABOUT, Modes, modes_at_rest, modes_of_motion
+from shoal.mechanics.analysis.modes import ABOUT, Modes, modes_at_rest, modes_of_motion, refuse_contacts
 from shoal.mechanics.analysis.modes_findings import ModesStatus, status_of
 from shoal.mechanics.analysis.steady import steady_motion
 from shoal.mechanics.machine import Machine
@@ -123,10 +123,7 @@ def campbell(
     if not speeds or not all(np.isfinite(speed) and speed >= 0 for speed in speeds):
         raise InputError(f"speeds: give speeds of at least 0 rad/s, found {', '.join(map(str, speeds)) or 'none'}")
     evaluator, placement = as_stated(scene), Machine.of(scene).placement
-    if evaluator.model.gaps.size:
-        raise InputError(f"{evaluator.model.gap_fields[0]}: steady motions take no one-sided constraints")
-    if evaluator.model.signals:
-        raise InputError(f"{evaluator.model.signal_fields[0]}: steady motions take no signals yet")
+    refuse_contacts(evaluator)
     q, v = (part[:, 0].copy() for part in (evaluator.model.q0, evaluator.model.v0))
     if any(speeds):
         if np.max(np.abs(v), initial=0.0) <= left_out.STILL:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from shoal.errors import InputError
 from shoal.mechanics.affine import points
 from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.analysis.felt import TURN, Felt, quarter
@@ -97,6 +98,7 @@ class _Rigid:
 
 def machines(scene: Scene, values: Mapping[str, Array], course: Course, lanes: list[int]) -> Iterator[Felt]:
     """Lanes of a scene along their motion, on one model. Raises InputError."""
+    _refuse_states(scene)
     picked = {path: np.asarray(numbers, dtype=float)[lanes] for path, numbers in values.items()}
     model = build(scene.with_lanes(picked), len(lanes), float(course.times[-1]))
     for k, lane in enumerate(lanes):
@@ -105,8 +107,15 @@ def machines(scene: Scene, values: Mapping[str, Array], course: Course, lanes: l
 
 def machine(scene: Scene, values: Mapping[str, Array], course: Course, lane: int) -> Felt:
     """A lane of a scene along its motion, on a model of its own. Raises InputError."""
+    _refuse_states(scene)
     one = scene.with_values({path: float(numbers[lane]) for path, numbers in values.items()})
     return _quantities(Evaluator.of(one, horizon=float(course.times[-1])), course, lane, 0)
+
+
+def _refuse_states(scene: Scene) -> None:
+    """Raises InputError for states, which places and angles of bodies do not tell."""
+    for name in scene.states:
+        raise InputError(f"states.{name}: accelerations and forces by the places of bodies know no states; use gauss")
 
 
 def _quantities(evaluator: Evaluator, course: Course, lane: int, of_model: int) -> Felt:

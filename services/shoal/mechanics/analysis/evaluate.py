@@ -9,6 +9,7 @@ state itself, and its row of Q is its rate, which the balance of forces lets van
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -118,20 +119,14 @@ class Evaluator:
     """Evaluates a model at any state; not for threads, as it keeps the turns that angle forces counted.
 
     lane: of the model; forces and accelerations are available in any lane, all else in the first. one_sided: whether
-    the caller sees to contacts, which are open unless their state is put in (`contacts`); signals: whether the caller
-    takes loads that follow these, and states. Raises InputError else.
+    the caller sees to contacts, which are open unless their state is put in (`contacts`). Raises InputError else.
     """
 
-    def __init__(self, model: Model, lane: int = 0, *, one_sided: bool = False, signals: bool = False) -> None:
+    def __init__(self, model: Model, lane: int = 0, *, one_sided: bool = False) -> None:
         if model.gaps.size and not one_sided:
             raise InputError(
                 f"{model.gap_fields[0]}: motions, reactions, sensors, equilibria and modes take one-sided constraints, "
                 "but not yet steady motions and starts from the end of a run"
-            )
-        if (fields := [*model.signal_fields, *(f"states.{name}" for name in model.scene.states)]) and not signals:
-            raise InputError(
-                f"{fields[0]}: signals and states are known in motions, signals in equilibria and modes, but neither "
-                "yet in reactions, virtual sensors, steady motions and starts from the end of a run"
             )
         self.model, self._strikes = model, False
         self.states = np.arange(model.unknowns - len(continuous_states(model.scene)), model.unknowns)
@@ -212,8 +207,14 @@ class Evaluator:
 
     @turns.setter
     def turns(self, angles: Array) -> None:
-        self._room.memory[:] = angles[: len(self._room.memory)]
-        self.signal_turns[:] = angles[len(self._room.memory) :]
+        own = len(self._room.memory)
+        self._room.memory[:], followed = angles[:own], angles[own:]
+        self.signal_turns[: len(followed)] = followed
+
+    @property
+    def force_turns(self) -> Array:
+        """Those of angle forces alone, (forces,)."""
+        return self._room.memory.copy()
 
     @property
     def signal_turns(self) -> Array:
@@ -293,14 +294,15 @@ class Evaluator:
 
     def along(
         self, way: Array, sample: Index, v: Array, times: Array, contacts: Array
-    ) -> tuple[Array, Array, list[Pressing]]:
+    ) -> tuple[Array, Array, list[Pressing], list[dict[str, float]]]:
         """Accelerations along a motion, (samples, unknowns), and the angles that angle forces count, (samples, forces).
 
-        Then what contacts exert. way: poses less than half a turn apart, from where they are counted, (poses,
-        unknowns); sample: which one each is, or -1, (poses,); v, (samples, unknowns), times [s] and contacts, (samples,
-        contacts, KEPT): of the samples
+        Then what contacts exert, and `strengths`. way: poses less than half a turn apart, from where they are counted,
+        (poses, unknowns); sample: which one each is, or -1, (poses,); v, (samples, unknowns), times [s] and contacts,
+        (samples, contacts, KEPT): of the samples
         """
         a, turns, pressing = np.empty_like(v), np.empty((len(v), len(self._room.memory))), list[Pressing]()
+        strengths = list[dict[str, float]]()
         n, tolerance = self.model.unknowns, self.model.scene.solver.rank_tolerance
         self._enter(way[0], None)
         for k, number in enumerate(sample.tolist()):
@@ -314,7 +316,8 @@ class Evaluator:
                 evaluations.accelerate(SINGLE, self._arrays, self._room, float(times[number]), tolerance)
                 a[number] = np.nan if self._strikes else self._room.a[:n]
                 pressing.append(self.pressing)
-        return a, turns, pressing
+                strengths.append(self._strengths_now(float(times[number])))
+        return a, turns, pressing, strengths
 
     def stored(self, way: Array, turns: Array) -> Array:
         """Strain energy [J] at poses, (poses, unknowns), at which angle forces have counted `turns`, (poses,)."""
@@ -374,6 +377,13 @@ class Evaluator:
         force = self._raised @ scipy.sparse.csc_array(blocks[:, signals.FORCE, :n].T)
         return scipy.sparse.csc_array(-force @ scipy.sparse.csr_array(blocks[:, by, :n]))
 
+    def values(self, q: Array, v: Array | None, t: float = 0.0) -> Array:
+        """Return the formulas of the model that are probed, at a state, (probes,)."""
+        self._enter(q, v)
+        feedback_at(self._arrays, self._room, t)
+        followed = self._arrays.followed
+        return signals.register(followed, self._room.signals)[followed.strength[list(self.model.probed)]]
+
     def probe(self, q: Array, v: Array | None = None, t: float = 0.0) -> Probe:
         """Look at the formulas of the model that are probed, and at how signals that are numbers act on it."""
         self._enter(q, v)
@@ -389,6 +399,26 @@ class Evaluator:
             self._raised @ (blocks[:, signals.FORCE].T @ by_constants),
             signals.on_a_kink(followed, own),
         )
+
+    def strengths(self, q: Array, v: Array | None, t: float = 0.0) -> dict[str, float]:
+        """Return the values of what loads follow at a state, by their fields."""
+        self._enter(q, v)
+        return self._strengths_now(t)
+
+    def _strengths_now(self, t: float) -> dict[str, float]:
+        followed = self._arrays.followed
+        if not followed:
+            return {}
+        feedback_at(self._arrays, self._room, t)
+        values = signals.register(followed, self._room.signals)[followed.output].tolist()
+        found = zip(self.model.recorded, values, strict=True)
+        return {field: value for field, value in found if field.startswith("loads.")}
+
+    def put(self, numbers: Mapping[str, float]) -> None:
+        """Let signals that are numbers have other values, by name."""
+        for k, name in enumerate(self.model.signal_names):
+            if name in numbers:
+                self._arrays.followed.constant[k] = numbers[name]
 
     def strain_energies(self, q: Array) -> dict[str, float]:
         """Strain energy [J] of every flexible body."""

@@ -18,6 +18,7 @@ from shoal.mechanics.assembly.groups import place_of
 from shoal.mechanics.ended import named_turns, start_angles
 from shoal.mechanics.frames import BeamFrame, Frame, PointFrame
 from shoal.mechanics.machine import Machine
+from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import Array, Index
 from shoal.mechanics.states import States
 from shoal.scene import Attachment, Scene
@@ -52,9 +53,9 @@ class Felt:
         self.gravity = np.array([float(np.ravel(part)[lane % np.size(part)]) for part in stated])
 
     @cached_property
-    def _along(self) -> tuple[Array, Array, list[Pressing]]:
-        """Accelerations, turns and what contacts exert."""
-        counted = self.evaluator.model.forces.size > 0
+    def _along(self) -> tuple[Array, Array, list[Pressing], list[dict[str, float]]]:
+        """Accelerations, turns, what contacts exert and what loads follow."""
+        counted = self.evaluator.model.forces.size > 0 or len(self.evaluator.signal_turns) > 0
         way, sample = self._way() if counted else (self.q, np.arange(len(self.q)))
         return self.evaluator.along(way, sample, self.v, np.asarray(self.times, dtype=float), self._contacts)
 
@@ -72,6 +73,11 @@ class Felt:
     def pressing(self) -> list[Pressing]:
         """Forces of contacts at every sample."""
         return self._along[2]
+
+    @property
+    def strengths(self) -> list[dict[str, float]]:
+        """Values of what loads follow at every sample, by their fields."""
+        return self._along[3]
 
     def specific_force(self, at: Attachment, tilt: Tilt = 0.0) -> Array:
         """Acceleration less gravity at a place of a body, along axes turned by `tilt` from its own.
@@ -139,7 +145,8 @@ def lanes_of(states: States, times: Array, lanes: list[int]) -> Iterator[Felt]:
     model = states.model
     if model.slowed:  # what moves more slowly than it would is felt as it would move
         free = build(model.stated, model.lanes, float(times[-1]))
-        model = replace(free, q0=model.q0, v0=model.v0, start_angles=model.start_angles)
+        turned = model.signal_angles
+        model = replace(free, q0=model.q0, v0=model.v0, start_angles=model.start_angles, signal_angles=turned)
     for lane in lanes:
         yield _quantities(Evaluator(model, lane, one_sided=True), states, times, lane, lane)
 
@@ -147,21 +154,28 @@ def lanes_of(states: States, times: Array, lanes: list[int]) -> Iterator[Felt]:
 def lane_of(states: States, times: Array, scene: Scene, values: Mapping[str, Array], lane: int) -> Felt:
     """A lane of a motion whose states are known, on a model of its own. Raises InputError."""
     one = scene.with_values({path: float(numbers[lane]) for path, numbers in values.items()})
-    model, begun = Machine.of(one).model(float(times[-1])), states.model
-    # It begins where the motion does, be that elsewhere than stated, with the turns counted there.
+    model = lane_start(states, Machine.of(one).model(float(times[-1])), lane)
+    return _quantities(Evaluator(model, one_sided=True), states, times, lane, 0)
+
+
+def lane_start(states: States, model: Model, lane: int) -> Model:
+    """Return a model of one lane that begins where the motion does, be that elsewhere than stated, with its turns."""
+    begun = states.model
     turns = named_turns(begun, begun.start_angles[:, lane % begun.start_angles.shape[1]])
     q, v = (part[0, :, lane, None].copy() for part in (states.q, states.v))
-    model = replace(model, q0=q, v0=v, start_angles=start_angles(model, [turns]), shared_tiles={})
-    return _quantities(Evaluator(model, one_sided=True), states, times, lane, 0)
+    turned = model.signal_angles.copy()
+    turned[: len(begun.signal_angles)] = begun.signal_angles[:, [lane % begun.signal_angles.shape[1]]]
+    angles = start_angles(model, [turns])
+    return replace(model, q0=q, v0=v, start_angles=angles, signal_angles=turned, shared_tiles={})
 
 
 def _quantities(evaluator: Evaluator, states: States, times: Array, lane: int, of_model: int) -> Felt:
     q, v = states.q[..., lane], states.v[..., lane]
     contacts = states.contacts[..., lane]
-    return Felt(evaluator, times, q, v, lambda: _joined(evaluator, times, q, v, of_model), of_model, contacts)
+    return Felt(evaluator, times, q, v, lambda: way_between(evaluator, times, q, v, of_model), of_model, contacts)
 
 
-def _joined(evaluator: Evaluator, times: Array, q: Array, v: Array, lane: int) -> tuple[Array, Index]:
+def way_between(evaluator: Evaluator, times: Array, q: Array, v: Array, lane: int) -> tuple[Array, Index]:
     """Poses close enough to count turns: those far apart are joined by cubics."""
     found = points(_directions(evaluator), evaluator.model.unknowns, lane)
     line, change = (np.einsum("kdu,nu->nkd", found.matrix, one) for one in (q, v))

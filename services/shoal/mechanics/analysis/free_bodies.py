@@ -6,7 +6,10 @@ rates S v and their accelerations S a; what their balance then lacks is what the
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
+from itertools import count
+from typing import Any
 
 import numpy as np
 import scipy.sparse
@@ -22,20 +25,25 @@ from shoal.mechanics.forces import LAW
 from shoal.mechanics.frames import BeamFrame
 from shoal.mechanics.machine import Machine
 from shoal.mechanics.modal.modes import held
+from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import Array
-from shoal.scene import InitialState, RigidBody, Rod, Scene
+from shoal.scene import InitialState, RigidBody, Rod, Scene, SignalFunction
+from shoal.scene.formula import Measure, Node, leaves
+from shoal.scene.signals import StateValue, expanded
 
 
 class FreeBodies:
     """The bodies of a model without its joints. horizon [s]: latest time that will be asked for.
 
-    evaluator, placement, mass: of the free bodies. Friction in joints is not among their loads.
+    evaluator, placement, mass: of the free bodies. Friction in joints is not among their loads. strengths: of those
+    loads that follow signals, which have to be put in at every state (`follow`).
     """
 
     def __init__(self, evaluator: Evaluator, horizon: float) -> None:
         whole = evaluator.model
         joined = Machine.of(whole.stated).placement
-        scene, added = _with_inertia(_without_joints(whole.scene, joined))
+        alone, self._names = _with_strengths(whole)
+        scene, added = _with_inertia(_without_joints(alone, joined))
         self.placement = place(scene)
         model = build(scene, horizon=horizon, placement=self.placement)
         # Springs at rest as they start keep the natural values of the whole machine; joint friction came before them.
@@ -44,10 +52,16 @@ class FreeBodies:
         angles = whole.start_angles[rubbing:]
         model = replace(model, forces=model.forces._replace(law=law), start_angles=angles, shared_tiles={})
         self.scene = whole.scene
+        self.strengths: Mapping[str, float] = {}
         self.evaluator = Evaluator(model)
-        self.evaluator.turns = evaluator.turns[rubbing:]
+        self.evaluator.turns = evaluator.force_turns[rubbing:]
         self.mass = self.evaluator.mass - self._turning(added)
         self._map = _coordinates(self.placement, joined, whole.unknowns)
+
+    def follow(self, strengths: Mapping[str, float]) -> None:
+        """Let loads that follow signals be as strong as they are in the machine, by their fields."""
+        self.strengths = strengths
+        self.evaluator.put({self._names[field]: value for field, value in strengths.items()})
 
     def _turning(self, added: dict[str, float]) -> scipy.sparse.csc_array:
         """The mass matrix of inertias alone [kg m^2]."""
@@ -67,6 +81,28 @@ class FreeBodies:
         """Coordinates, rates and accelerations of the free bodies, (..., unknowns)."""
         matrix, constant = self._map
         return (matrix @ q.T).T + constant, (matrix @ v.T).T, (matrix @ a.T).T
+
+
+def _with_strengths(model: Model) -> tuple[Scene, dict[str, str]]:
+    """Return the scene of a model without states, whose loads follow numbers in place of signals.
+
+    Then the names of these numbers, by the fields of the loads.
+    """
+    scene, loads = model.scene, dict(model.scene.loads)
+    known = expanded(scene)
+    signals: dict[str, Any] = {name: one for name, one in scene.signals.items() if not _is_measured(known[name])}
+    names = {}
+    for field in (one for one in model.recorded if one.startswith("loads.")):
+        names[field] = own = next(one for one in map("strength{}".format, count()) if one not in signals)
+        signals[own] = SignalFunction(number=0.0)
+        name, part = field.removeprefix("loads.").rsplit(".", 1)
+        loads[name] = loads[name].model_copy(update={part: SignalFunction(expression=own)})
+    return scene.model_copy(update={"loads": loads, "signals": signals, "states": {}}), names
+
+
+def _is_measured(node: Node) -> bool:
+    """Return whether a formula depends on the motion."""
+    return any(isinstance(leaf, Measure | StateValue) for leaf in leaves(node))
 
 
 def _without_joints(scene: Scene, placement: Placement) -> Scene:

@@ -15,7 +15,7 @@ from shoal.mechanics.affine import Affine
 from shoal.mechanics.analysis import triads
 from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.assembly.groups import start_angle
-from shoal.mechanics.ended import start_angles
+from shoal.mechanics.ended import measured, start_angles
 from shoal.mechanics.frames import BeamFrame
 from shoal.mechanics.machine import Machine
 from shoal.mechanics.model import Model
@@ -42,10 +42,21 @@ def taken_up(model: Model, state: End) -> Model:
     found = [_coordinates(model, state, vectors, lane) for lane in range(model.lanes if differ else 1)]
     q, v = (np.stack(columns, axis=1) for columns in zip(*found, strict=True))
     q, v = (np.broadcast_to(part, (model.unknowns, model.lanes)).copy() for part in (q, v))
+    scene = model.stated
+    if missing := sorted(set(scene.states) ^ set(state.states)):
+        whose = "the run has" if missing[0] in state.states else "the scene has"
+        raise InputError(f"initial.from: states.{missing[0]}: only {whose} such a state")
+    for k, (name, one) in enumerate(scene.states.items()):
+        v[model.unknowns - len(scene.states) + k] = state.states[name] / one.size
+    turned = model.signal_angles.copy()
+    for k, name in enumerate(measured(model)):
+        turned[k] = state.measures.get(name, turned[k])
     angles = start_angles(model, [state.turns] * model.start_angles.shape[1])
     known, stated = state.angles, model.scene.markers.items()
     markers = stacked([known.get(name, start_angle(model.scene, marker)) for name, marker in stated])
-    model = replace(model, q0=q, v0=v, start_angles=angles, marker_angles=markers, shared_tiles={})
+    model = replace(
+        model, q0=q, v0=v, start_angles=angles, marker_angles=markers, signal_angles=turned, shared_tiles={}
+    )
     for lane in range(model.lanes if model.varies else 1):
         _check_joints(model, lane)
     return model
@@ -60,7 +71,7 @@ def as_stated(scene: Scene, *, horizon: float = 0.0) -> Evaluator:
     model = Machine.of(scene).model(horizon)
     if isinstance(scene.initial_from, End):
         model = taken_up(model, scene.initial_from)
-    return Evaluator(resting(model), one_sided=True, signals=True)
+    return Evaluator(resting(model), one_sided=True)
 
 
 def resting(model: Model) -> Model:

@@ -318,14 +318,17 @@ def reactions_of(
     bodies: FreeBodies | None = None,
     pressing: Pressing | None = None,
     impacts: Sequence[Mapping[str, Any]] = (),
+    resting: bool = False,
 ) -> Reactions:
     """Return the reactions at one state: coordinates, rates and accelerations, each (unknowns,).
 
+    resting: whether states of the user stand in place of their unknowns, as at rest;
     pressing: what contacts exert, of a machine that has some; impacts: at this time.
     """
     bodies = bodies or FreeBodies(evaluator, t)
     rubbing = evaluator.model.forces.size - bodies.evaluator.model.forces.size
-    bodies.evaluator.turns = evaluator.turns[rubbing:]
+    bodies.evaluator.turns = evaluator.force_turns[rubbing:]
+    bodies.follow(evaluator.strengths(q, None if resting else v, t))
     at, rate, change = bodies.state(q, v, a)
     motion = FreeMotion(bodies, at[None], rate[None])
     here = bodies.evaluator.at(at, rate, t)

@@ -260,7 +260,7 @@ def modes(
     check(time=time, count=count)
     evaluator, moving = (at_start if about == "start" else as_stated)(scene, horizon=time), list[Finding]()
     if is_moving(evaluator, time):
-        _refuse_contacts(evaluator)
+        refuse_contacts(evaluator)
         q, v = (part[:, 0].copy() for part in (evaluator.model.q0, evaluator.model.v0))
         try:
             return modes_of_motion(scene, evaluator, q, v, about=about, time=time, count=count)[0]
@@ -287,12 +287,15 @@ def _but_for_gravity(scene: Scene, about: str) -> list[str]:
     return [f"gravity alone acts against it: it is steady with --set gravity=[{zeros}]{shaft}"]
 
 
-def _refuse_contacts(evaluator: Evaluator) -> None:
-    """Raises InputError for machines with one-sided constraints or signals, of which steady motions know nothing."""
+def refuse_contacts(evaluator: Evaluator) -> None:
+    """Raises InputError for machines with one-sided constraints or states, of which steady motions know nothing."""
     if evaluator.model.gaps.size:
         raise InputError(f"{evaluator.model.gap_fields[0]}: steady motions take no one-sided constraints")
-    if evaluator.model.signals:
-        raise InputError(f"{evaluator.model.signal_fields[0]}: steady motions take no signals yet")
+    for name in evaluator.model.scene.states:
+        raise InputError(
+            f"states.{name}: modes about steady motions take signals, but no states yet; "
+            "`linearize` with about: start does"
+        )
 
 
 def is_moving(evaluator: Evaluator, time: float) -> bool:

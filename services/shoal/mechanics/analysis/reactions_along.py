@@ -47,6 +47,7 @@ def reactions_along(felt: Felt, names: tuple[str, ...]) -> dict[str, Reaction]:
     force = np.empty_like(at)
     for k, (q, v, t) in enumerate(zip(at, rate, felt.times, strict=True)):
         bodies.evaluator.turns = felt.turns[k, rubbing:]
+        bodies.follow(felt.strengths[k])
         force[k] = bodies.evaluator.force(q, v, float(t))
     parts = []
     for first in range(0, len(at), BLOCK):

@@ -79,7 +79,7 @@ def sections(
     length = float(frame.element_length)
     broken = _interrupted(scene, rod, body)
     load = np.array(padded(scene.gravity, scene.dimensions))
-    along = [d for d in scene.loads.values() if isinstance(d, DistributedForce) and d.body == rod]
+    along = [(name, d) for name, d in scene.loads.items() if isinstance(d, DistributedForce) and d.body == rod]
     cross = plane.cross if scene.dimensions == plane.DIMENSIONS else turns.cross
     arcs: list[float] = []
     tangents, forces, moments = list[Array](), list[Array](), list[Array]()
@@ -89,9 +89,10 @@ def sections(
         inertia = np.array(element.mass(density, section, length)) @ change[own]
         weight = np.outer(element.weight(density * section.area, length), load)
         unit = np.array(element.weight(1.0, length))
-        for one in along:
-            force = np.array(padded(one.force, scene.dimensions))
-            weight = weight + np.outer(unit, force) * float(one.scale(np.array(t)))
+        for name, one in along:
+            force, field = np.array(padded(one.force, scene.dimensions)), f"loads.{name}.scale"
+            strength = bodies.strengths[field] if field in bodies.strengths else float(one.scale(np.array(t)))
+            weight = weight + np.outer(unit, force) * strength
         ends = inertia - elastic[own] - weight
         order = len(ends) // 2
         for end in range(2):

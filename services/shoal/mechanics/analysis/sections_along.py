@@ -40,8 +40,9 @@ def section_along(felt: Felt, at: Attachment) -> SectionForces:
     x, ends = share - number, slice(2 * number, 2 * number + 2)
     bodies = FreeBodies(felt.evaluator, float(felt.times[-1]))
     rows = []
-    for q, v, a, turns, t in zip(felt.q, felt.v, felt.a, felt.turns, felt.times.tolist(), strict=True):
-        felt.evaluator.turns = turns
+    for k, (q, v, a, t) in enumerate(zip(felt.q, felt.v, felt.a, felt.times.tolist(), strict=True)):
+        felt.evaluator.turns = felt.turns[k]
+        bodies.follow(felt.strengths[k])
         both = _at_ends(sections(felt.evaluator, q, v, a, t, name, bodies=bodies), ends)
         rows.append((1 - x) * both[:, 0] + x * both[:, 1])
     found = SectionForces(*np.array(rows).T)

@@ -303,15 +303,14 @@ class _Search:
         is_pressed = any(self.pressing.values())
         pressed = self.balance.pressed(q) if is_pressed else None
         pressed = pressed if self.friction is None else self.friction.pressing
-        known = balanced and not self.evaluator.model.signals and not self.scene.states
         react = (
-            cache(lambda: reactions_of(self.evaluator, q, rest, rest, self.time, pressing=pressed)) if known else None
+            cache(lambda: reactions_of(self.evaluator, q, rest, rest, self.time, pressing=pressed, resting=True))
+            if balanced
+            else None
         )
         neglected = [left_out.driven(self.evaluator, q, self.time)]
         if self.friction is None:
             neglected.insert(0, left_out.friction(self.scene, react))
-        if fields := self.evaluator.model.signal_fields if self.reactions else ():
-            neglected.append(f"reactions of joints are left out where loads follow signals ({', '.join(fields)})")
         rubbing = (name for name, one in self.scene.contacts.items() if one.rubs)
         rough = [name for name in rubbing if f"contacts.{name}" in self.pressing]
         if self.friction is None and rough:

@@ -71,7 +71,7 @@ def needs_states(quantity: str, scene: Scene) -> bool:
         return True
     dynamic = quantity in ENERGIES or quantity in REACTIONS[scene.dimensions]
     bends = any(body.element != "rigid" for body in scene.bodies.values())
-    return dynamic and (scene.dimensions == 3 or bends or scene.touches)
+    return dynamic and (scene.dimensions == 3 or bends or scene.touches or bool(scene.states))
 
 
 def check(place: str, quantity: str, scene: Scene) -> None:
