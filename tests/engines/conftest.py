@@ -470,6 +470,14 @@ ONLY_NATIVE = [
         "delayed",
         {"E": HANG},
     ).with_values({"states": {"x": {"rate": "1 - x"}}}),
+    scene(
+        "sampled",
+        {"A": BALL},
+        {"O": joint(GROUND, at("A"), "slider")},
+        {"A": at("A")},
+        loads={"push": {"kind": "thrust", "joint": "O", "force": "u"}},
+        signals={"u": {"sample": "1 - slide(O)", "period": 0.01}},
+    ),
     pendulum("at-rest", CABLE, CLAMP).with_values({"initial.from": "statics", "initial.A.rate": 0.0}),
     scene(
         "going-on",

@@ -235,7 +235,7 @@ def test_ground_needs_no_point_where_only_a_direction_matters() -> None:
 @pytest.mark.parametrize(
     ("path", "why"),
     [
-        ("controllers.pid.kp", "a controller is read as signals and states: set signals.pid_kp"),
+        ("controllers.pid.kp", "controllers are read as signals and states: set signals.pid_kp"),
         ("controllers", "set signals.NAME_kp and the like"),
         ("signals.new", "signals has kp; a new one is stated in the file of the scene"),
         ("states.x", "states has none; a new one is stated in the file of the scene"),

@@ -40,7 +40,7 @@ from shoal.mechanics.machine import Machine
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
 from shoal.mechanics.simulate import simulate
-from shoal.scene import DistributedForce, Force, PointMass, Revolute, Scene, SignalFunction, Slider, Torque
+from shoal.scene import DistributedForce, Force, PointMass, Revolute, Scene, SignalFunction, Slider, Thrust, Torque
 from shoal.scene.formula import Measure, Node
 from shoal.scene.signals import (
     SLIDING,
@@ -384,7 +384,7 @@ def _open(scene: Scene, inputs: Sequence[str], time: float) -> tuple[Scene, list
     return scene.model_copy(update={"signals": signals, "loads": loads}), names
 
 
-_FIELDS: dict[type, str] = {Torque: "torque", Force: "scale", DistributedForce: "scale"}
+_FIELDS: dict[type, str] = {Torque: "torque", Thrust: "force", Force: "scale", DistributedForce: "scale"}
 
 
 def _known(scene: Scene) -> str:

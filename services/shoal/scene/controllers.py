@@ -1,4 +1,4 @@
-"""Controllers of a scene: templates that become signals and states when the scene is read.
+"""Controllers and actuators of a scene: templates that become its other parts when the scene is read.
 
 A controller NAME is the signal NAME, its output. Its gains are signals that are numbers, NAME_kp and so on, which are
 swept and identified like these; its memory are states. With `sampled` both are sampled.
@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, TypeAdapter, ValidationError, model_validator
 
+from shoal.scene.actuators import Actuator, AnyActuator, acting
 from shoal.scene.record import Positive, Record, one_line
 from shoal.scene.sampled import Sampling
 
@@ -227,30 +228,47 @@ def _output(name: str, a: list[float], b: list[float]) -> str:
 
 
 Controller = Annotated[Pid | StateFeedback | TransferFunction, Field(discriminator="kind")]
-_ADAPTER: TypeAdapter[Any] = TypeAdapter(Controller)
+_ADAPTERS: dict[str, TypeAdapter[Any]] = {"controllers": TypeAdapter(Controller), "actuators": TypeAdapter(AnyActuator)}
+_NOTHING: dict[str, Any] = {part: {} for part in _ADAPTERS}
 
 
 def with_controllers(data: dict[str, Any]) -> dict[str, Any]:
-    """Return the fields of a scene with its controllers as signals and states. Raises ValueError."""
-    stated, given = data.get("controllers"), [data.get(part) or {} for part in ("signals", "states")]
-    if not stated or not all(isinstance(part, dict) for part in (stated, *given)):
+    """Return the fields of a scene with controllers as signals and states, and actuators as these and loads.
+
+    Raises ValueError.
+    """
+    stated, parts = [data.get(part) or {} for part in _ADAPTERS], ("signals", "states", "loads", "joints")
+    given = [data.get(part) or {} for part in parts]
+    if not any(stated) or not all(isinstance(part, dict) for part in (*stated, *given)):
         return data
-    signals, states = (dict(part) for part in given)
-    for name, one in stated.items():
-        if not _NAME.fullmatch(str(name)):
-            raise ValueError(f"controllers.{name}: a name in formulas has letters, digits and underscores")
-        for there, found in zip((signals, states), _formulas(str(name), one), strict=True):
-            if twice := next((new for new in found if new in signals or new in states), None):
-                raise ValueError(f"controllers.{name}: makes {twice}, which is there already; rename one of them")
-            there |= found
-    return {**data, "signals": signals, "states": states, "controllers": {}}
+    signals, states, loads, joints = (dict(part) for part in given)
+    for kind, those in zip(_ADAPTERS, stated, strict=True):
+        for name, one in those.items():
+            if not _NAME.fullmatch(str(name)):
+                raise ValueError(f"{kind}.{name}: a name in formulas has letters, digits and underscores")
+            template = _read(kind, str(name), one)
+            if isinstance(template, Actuator):
+                made, load, joints[template.joint] = acting(str(name), template, joints)
+                if name in loads:
+                    raise ValueError(
+                        f"{kind}.{name}: makes the load {name}, which is there already; rename one of them"
+                    )
+                loads[name] = load
+            else:
+                made = template.formulas(str(name))
+            for there, found in zip((signals, states), made, strict=True):
+                if twice := next((new for new in found if new in signals or new in states), None):
+                    raise ValueError(f"{kind}.{name}: makes {twice}, which is there already; rename one of them")
+                there |= found
+    found_parts = dict(zip(parts, (signals, states, loads, joints), strict=True))
+    return {**data, **{part: found for part, found in found_parts.items() if found or part in data}, **_NOTHING}
 
 
-def _formulas(name: str, stated: Any) -> Formulas:
+def _read(part: str, name: str, stated: Any) -> Any:
+    """Return a template of a part of the scene. Raises ValueError in one line."""
     try:
-        made: Formulas = _ADAPTER.validate_python(stated).formulas(name)
+        return _ADAPTERS[part].validate_python(stated)
     except ValidationError as error:
         kind = stated.get("kind") if isinstance(stated, dict) else None
-        line = str(one_line(error, f"controllers.{name}"))
-        raise ValueError(re.sub(rf"^controllers\.{name}: {kind}(: |\.)", f"controllers.{name}.", line)) from None
-    return made
+        line = str(one_line(error, f"{part}.{name}"))
+        raise ValueError(re.sub(rf"^{part}\.{name}: {kind}(: |\.)", f"{part}.{name}.", line)) from None

@@ -85,6 +85,16 @@ class Torque(Record):
     """The body that takes the reaction; by default the ground."""
 
 
+class Thrust(Record):
+    """A force along the line of a slider on its second body; the first one takes the reaction."""
+
+    kind: Literal["thrust"] = "thrust"
+    joint: str
+    """Name of the slider."""
+    force: SignalFunction
+    """Force [N] as a function of time and signals."""
+
+
 class DistributedForce(Record):
     """A force per length along a whole rod, fixed in direction, times a function of time and signals."""
 
@@ -97,5 +107,5 @@ class DistributedForce(Record):
     """Factor as a function of time and signals [1]."""
 
 
-Load = Annotated[Spring | TorsionSpring | Force | Torque | DistributedForce, Field(discriminator="kind")]
+Load = Annotated[Spring | TorsionSpring | Force | Torque | Thrust | DistributedForce, Field(discriminator="kind")]
 LOAD_KINDS = kinds(Load)

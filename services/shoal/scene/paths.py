@@ -98,12 +98,12 @@ def unknown(path: str, parent: str, place: Any) -> InputError:
     if place is None and parent.startswith("initial.") and parent.endswith((".position", *_VECTORS)):
         whole = ", such as [0, 0, 0]" if parent.endswith(_VECTORS) else ""
         return InputError(f"{path}: {parent} is not stated, so it has no component to set; state it whole{whole}")
-    if parent == "controllers" or path.split(".")[0] == "controllers":
+    if (part := path.split(".")[0]) in ("controllers", "actuators"):
         name, *gain = path.split(".")[1:] or ["NAME"]
         such = f"signals.{name}_{gain[0]}" if len(gain) == 1 else f"signals.{name}_kp and the like"
         return InputError(
-            f"{path}: no such field; a controller is read as signals and states: set {such}, or state another "
-            "controller in the file of the scene"
+            f"{path}: no such field; {part} are read as signals and states: set {such}, or state another one in the "
+            "file of the scene"
         )
     if parent in ("signals", "states"):
         return InputError(

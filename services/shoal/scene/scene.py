@@ -14,6 +14,7 @@ from pydantic import Field, ValidationError, model_validator
 
 from shoal.errors import InputError
 from shoal.scene import joints as joint_types
+from shoal.scene.actuators import AnyActuator
 from shoal.scene.amplitudes import check_amplitudes, check_place
 from shoal.scene.bodies import FRAMED, Body, Rod
 from shoal.scene.clearances import check_clearances, contacts_of
@@ -36,7 +37,7 @@ from shoal.scene.initial import (
     guessed,
 )
 from shoal.scene.joints import GROUND, Attachment, Joint, MovingPoint, Universal
-from shoal.scene.loads import DistributedForce, Force, Load
+from shoal.scene.loads import DistributedForce, Force, Load, Thrust
 from shoal.scene.paths import key, parts, shared, unknown, unwrapped, with_lanes
 from shoal.scene.record import Record, Vector, one_line
 from shoal.scene.sampled import Signal, refuse_apart
@@ -84,6 +85,8 @@ class Scene(Record):
     """States of controllers, actuators and other dynamics of first order, by name."""
     controllers: Annotated[dict[SignalName, Controller], Field(exclude=True)] = {}
     """Controllers by name; when a scene is read they become signals and states, which it is written with."""
+    actuators: Annotated[dict[SignalName, AnyActuator], Field(exclude=True)] = {}
+    """Actuators by name; when a scene is read they become signals, states, loads and the armature of joints."""
     ground_points: dict[Name, MovingPoint] = {}
     """Moving points of the ground by name."""
     markers: Annotated[dict[Name, Attachment], Field(min_length=1)]
@@ -165,6 +168,9 @@ class Scene(Record):
         for name, load in self.loads.items():
             for field, side in joint_types.sides(load).items():
                 self._check_attachment(f"loads.{name}.{field}", side)
+            if isinstance(load, Thrust) and getattr(self.joints.get(load.joint), "kind", "") != "slider":
+                known = ", ".join(one for one, joint in self.joints.items() if joint.kind == "slider") or "none"
+                raise ValueError(f"loads.{name}.joint: {load.joint!r} is not a slider of this scene; there are {known}")
             if isinstance(load, DistributedForce) and getattr(self.bodies.get(load.body), "kind", "") != "rod":
                 raise ValueError(f"loads.{name}.body: {load.body!r} is not a rod of this scene")
         for name, marker in self.markers.items():

@@ -25,6 +25,7 @@ from shoal.scene import (
     PointMass,
     Rod,
     Scene,
+    Thrust,
     Torque,
     Weld,
 )
@@ -160,6 +161,8 @@ def _applied(scene: Scene, name: str, rod: Rod) -> tuple[float, float]:
             force += float(np.linalg.norm(load.force)) * _constant(load.scale)
         elif isinstance(load, Torque) and name in {side.body for side in sides(load).values()}:
             moment += _constant(load.torque)
+        elif isinstance(load, Thrust) and name in {side.body for side in places(scene.joints[load.joint])}:
+            force += _constant(load.force)
         elif name in {side.body for side in sides(load).values()}:
             force = np.nan
     return force, moment

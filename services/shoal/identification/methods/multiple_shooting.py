@@ -25,7 +25,7 @@ from shoal.identification.recording.measurement import Recording
 from shoal.identification.recording.source import Channel
 from shoal.scene import Scene
 from shoal.scene.joints import Attachment, Revolute
-from shoal.scene.loads import DistributedForce, Force, Load, Spring, Torque, TorsionSpring
+from shoal.scene.loads import DistributedForce, Force, Load, Spring, Thrust, Torque, TorsionSpring
 from shoal.trajectory import Array
 
 SEGMENT = 0.5
@@ -292,6 +292,8 @@ def _driven(load: Load) -> bool:
     match load:
         case Torque():
             return load.torque.number is None
+        case Thrust():
+            return load.force.number is None
         case Force() | DistributedForce():
             return load.scale.number is None
         case Spring() | TorsionSpring():

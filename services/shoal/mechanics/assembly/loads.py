@@ -35,6 +35,7 @@ from shoal.scene import (
     SignalFunction,
     Slider,
     Spring,
+    Thrust,
     Torque,
     TorsionSpring,
 )
@@ -147,6 +148,18 @@ class Loads(Measures):
             self._angle(name, base, load.at, law, load.axis, drive=torque)
         else:
             self.signals.turn(name, base, load.at, self.signals.strength(f"loads.{name}.torque", node))
+
+    def _thrust(self, name: str, load: Thrust) -> None:
+        joint = self.scene.joints[load.joint]
+        assert isinstance(joint, Slider)
+        line = self.placement.line(joint.first, joint.direction if joint.axis is None else joint.axis)
+        ends = [self.placement.point(self.scene, side) for side in (joint.first, joint.second)]
+        law = ElementForceLaw(amplitude=1.0)
+        force, node = self.signals.resolve(load.force)
+        if node is None:
+            self._measure(name, PLACE, [*ends, line], law, 0.0, drive=force)
+        else:
+            self.signals.push(name, [*ends, line], self.signals.strength(f"loads.{name}.force", node))
 
     def _turn_body(self, name: str, load: Torque, placement: SpatialPlacement) -> None:
         """A torque in space about an axis of the body that takes it, or of the ground."""
@@ -266,5 +279,6 @@ LOADS: dict[type, Callable[[Loads, str, Any], None]] = {
     TorsionSpring: Loads._torsion_spring,
     Force: Loads._force,
     Torque: Loads._torque,
+    Thrust: Loads._thrust,
     DistributedForce: Loads._distributed,
 }

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from shoal.mechanics import tape
+from shoal.mechanics.affine import Affine
 from shoal.mechanics.applied import Applied
 from shoal.mechanics.assembly.measures import ElementForceLaw, Measures
 from shoal.mechanics.forces import DISTANCE, PLACE
@@ -152,6 +153,11 @@ class SignalLoads:
     def turn(self, name: str, first: Attachment, second: Attachment, strength: int) -> None:
         """Let a torque of the plane follow a strength."""
         self._torques._angle(name, first, second, ElementForceLaw(amplitude=1.0), Z)
+        self._turning.append(strength)
+
+    def push(self, name: str, vectors: list[Affine], strength: int) -> None:
+        """Let a force along a line follow a strength. vectors: both places and the line's direction."""
+        self._torques._measure(name, PLACE, vectors, ElementForceLaw(amplitude=1.0), 0.0)
         self._turning.append(strength)
 
     def signals(self, applied: Callable[[Callable[[int], int]], Applied]) -> Signals | tuple[()]:
