@@ -16,6 +16,7 @@ from shoal.mechanics.forces import ANGLE
 from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import Array
 from shoal.scene.ended import BodyState, End, mesh_of
+from shoal.scene.signals import continuous_states
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,9 +59,10 @@ class Ended(Mapping[str, Any]):
             )
         turns = named_turns(self.model, self.turns)
         angles = dict(zip(scene.markers, self.angles.tolist(), strict=True))
-        sizes = [float(state.size) for state in scene.states.values()]
+        own = continuous_states(scene)
+        sizes = [float(state.size) for state in own.values()]
         values = self.v[len(self.v) - len(sizes) :] * sizes
-        states = dict(zip(scene.states, values.tolist(), strict=True))
+        states = dict(zip(own, values.tolist(), strict=True))
         counted = dict(zip(measured(self.model), self.turns[self.model.forces.size :].tolist(), strict=True))
         end = End.model_construct(
             t=self.time, bodies=bodies, turns=turns, angles=angles, states=states, measures=counted

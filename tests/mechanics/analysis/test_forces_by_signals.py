@@ -126,3 +126,18 @@ def test_modes_of_a_steady_motion_under_feedback() -> None:
     data["loads"]["motor"]["torque"] = "0.7*(5 - rate(axle)) + sum"
     with pytest.raises(InputError, match=r"states.sum: modes about steady motions take signals, but no states yet"):
         modes(Scene.parse(data))
+
+
+def test_held_values_are_refused_where_they_are_not_known() -> None:
+    """A run tells its continuous states; what a sampled controller holds is none of them."""
+    data = pendulum("u")
+    pid = {"kind": "pid", "of": "0.5 - angle(hinge)", "kp": 40, "ki": 20, "kd": 5, "rate": "-rate(hinge)"}
+    data |= {"signals": {}, "controllers": {"u": {**pid, "sampled": {"period": 0.01}}}}
+    data["states"] = {"late": {"rate": "(angle(hinge) - late)/0.1"}}
+    scene = Scene.parse(data)
+    with pytest.raises(InputError, match="reactions and virtual sensors know no held values"):
+        reactions(scene, [0.1])
+    end = dict(simulate(scene, np.array([0.1])).end)
+    assert list(end["states"]) == ["late"]
+    with pytest.raises(InputError, match="what it holds at the end of a run is not kept"):
+        simulate(scene.with_values({"initial.from": end}), np.array([0.1]))

@@ -23,9 +23,12 @@ from shoal.mechanics.numerics.tile import Array, Index
 from shoal.mechanics.states import States
 from shoal.scene import Attachment, Scene
 from shoal.scene.dimensions import padded
+from shoal.scene.signals import refuse_sampled
 
 TURN = 1.0
 """The turns of angle forces are counted at poses that are no farther apart [rad]."""
+HELD = "reactions and virtual sensors know no held values yet; take a continuous controller"
+"""Why machines with sampled signals are refused."""
 _GAUGE = 1e-3
 """Length of a strain gauge over that of its rod."""
 
@@ -55,6 +58,7 @@ class Felt:
     @cached_property
     def _along(self) -> tuple[Array, Array, list[Pressing], list[dict[str, float]]]:
         """Accelerations, turns, what contacts exert and what loads follow."""
+        refuse_sampled(self.scene, HELD)
         counted = self.evaluator.model.forces.size > 0 or len(self.evaluator.signal_turns) > 0
         way, sample = self._way() if counted else (self.q, np.arange(len(self.q)))
         return self.evaluator.along(way, sample, self.v, np.asarray(self.times, dtype=float), self._contacts)

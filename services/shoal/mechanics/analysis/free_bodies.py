@@ -29,7 +29,8 @@ from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import Array
 from shoal.scene import InitialState, RigidBody, Rod, Scene, SignalFunction
 from shoal.scene.formula import Measure, Node, leaves
-from shoal.scene.signals import StateValue, expanded
+from shoal.scene.sampled import Sampled
+from shoal.scene.signals import HeldValue, StateValue, expanded
 
 
 class FreeBodies:
@@ -90,7 +91,9 @@ def _with_strengths(model: Model) -> tuple[Scene, dict[str, str]]:
     """
     scene, loads = model.scene, dict(model.scene.loads)
     known = expanded(scene)
-    signals: dict[str, Any] = {name: one for name, one in scene.signals.items() if not _is_measured(known[name])}
+    signals: dict[str, Any] = {
+        name: one for name, one in scene.signals.items() if not (_is_measured(known[name]) or isinstance(one, Sampled))
+    }
     names = {}
     for field in (one for one in model.recorded if one.startswith("loads.")):
         names[field] = own = next(one for one in map("strength{}".format, count()) if one not in signals)
@@ -102,7 +105,7 @@ def _with_strengths(model: Model) -> tuple[Scene, dict[str, str]]:
 
 def _is_measured(node: Node) -> bool:
     """Return whether a formula depends on the motion."""
-    return any(isinstance(leaf, Measure | StateValue) for leaf in leaves(node))
+    return any(isinstance(leaf, Measure | StateValue | HeldValue) for leaf in leaves(node))
 
 
 def _without_joints(scene: Scene, placement: Placement) -> Scene:

@@ -43,6 +43,7 @@ def taken_up(model: Model, state: End) -> Model:
     q, v = (np.stack(columns, axis=1) for columns in zip(*found, strict=True))
     q, v = (np.broadcast_to(part, (model.unknowns, model.lanes)).copy() for part in (q, v))
     scene = model.stated
+    refuse_sampled(scene, "what it holds at the end of a run is not kept; start anew")
     if missing := sorted(set(scene.states) ^ set(state.states)):
         whose = "the run has" if missing[0] in state.states else "the scene has"
         raise InputError(f"initial.from: states.{missing[0]}: only {whose} such a state")

@@ -10,6 +10,7 @@ import numpy as np
 from shoal.errors import ComputationError, InputError
 from shoal.mechanics.analysis.at_rest import begun
 from shoal.mechanics.analysis.evaluate import Evaluator, Pressing
+from shoal.mechanics.analysis.felt import HELD
 from shoal.mechanics.analysis.free_bodies import FreeBodies
 from shoal.mechanics.analysis.joint_reactions import Reactions, reactions_of
 from shoal.mechanics.ended import Ended
@@ -19,6 +20,7 @@ from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.runs import Runs, check_step
 from shoal.mechanics.stability import step_limit
 from shoal.scene import Scene
+from shoal.scene.signals import refuse_sampled
 from shoal.trajectory import Trajectory
 
 AT_ONCE = 1e-9
@@ -59,6 +61,7 @@ def states(scene: Scene, times: Sequence[float]) -> tuple[Evaluator, list[Motion
     """
     if not len(times) or not all(np.isfinite(t) and t >= 0 for t in times):
         raise InputError("times: give times of at least 0 s")
+    refuse_sampled(scene, HELD)
     model, solver = begun(Machine.of(scene).model(max(times))), scene.solver
     choice = pick(solver, model, step_limit)
     if max(times) > 0:

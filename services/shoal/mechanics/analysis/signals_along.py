@@ -15,7 +15,7 @@ from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.states import States
 from shoal.scene import Scene, SignalFunction
-from shoal.scene.signals import written_out
+from shoal.scene.signals import refuse_sampled, written_out
 
 
 def signals_along(
@@ -32,6 +32,7 @@ def signals_along(
         found[:] = np.moveaxis(states.signals[:, [recorded.index(name) for name in names]], 1, 0)
         if np.all(np.isfinite(found[..., finite])):
             return found
+    refuse_sampled(scene, f"of {', '.join(names)} nothing is recorded; let a load follow it, or take a state")
     probes = tuple(written_out(scene, SignalFunction(expression=name)) for name in names)
     model = (
         None if values else _on(states.model, build(states.model.stated, states.model.lanes, times[-1], None, probes))
