@@ -14,6 +14,7 @@ from shoal.engines import get_engine
 from shoal.engines.verification import verified
 from shoal.errors import InputError
 from shoal.mechanics.analysis.modes import modes
+from shoal.mechanics.analysis.reactions import reactions
 from shoal.mechanics.analysis.statics import statics
 from shoal.mechanics.linear_model import linearize
 from shoal.mechanics.simulate import simulate
@@ -243,6 +244,9 @@ def test_what_takes_no_samples_says_so() -> None:
             analysis(scene)
     with pytest.raises(InputError, match=r"signals.u_error: sampled every 0.01 s: linear models"):
         linearize(scene, ["push"], ["slide(rail)"], about="start")
+    with pytest.raises(InputError, match=r"signals.u_error: sampled every 0.01 s: reactions, sensors"):
+        reactions(scene, [0.5])
+    assert simulate(scene, np.array([0.1])).end is None
     with pytest.raises(InputError, match=r"signals.u: its period of 1e-07 s makes 3e\+07 samples in 3 s"):
         simulate(driven(controllers={"u": {**PID, "ki": 0, "kd": 0, "sampled": {"period": 1e-7}}}), np.array([3.0]))
 

@@ -22,7 +22,7 @@ def energies(scene: Scene, times: Array) -> Array:
         instants = np.union1d(times, np.arange(0.0, times[-1], scene.solver.step))
     states = simulate(scene, instants, whole=True).states
     # Contacts have no energy, and are left to the caller.
-    evaluator, wanted, found = Evaluator(states.model, one_sided=True), set(times.tolist()), []
+    evaluator, wanted, found = Evaluator(states.model, one_sided=True, held=True), set(times.tolist()), []
     for k, time in enumerate(instants.tolist()):
         evaluator.remember(states.q[k, :, 0])
         if time in wanted:

@@ -37,7 +37,7 @@ from shoal.mechanics.numerics.tile import SINGLE, Array, Index
 from shoal.mechanics.reach import span
 from shoal.mechanics.tangent import Tangent, damping_at, stiffness_at, tangent_tile
 from shoal.scene import Scene
-from shoal.scene.signals import continuous_states
+from shoal.scene.signals import continuous_states, refuse_sampled
 
 Sparse = scipy.sparse.csr_array
 _LANE = slice(0, 1)
@@ -119,10 +119,14 @@ class Evaluator:
     """Evaluates a model at any state; not for threads, as it keeps the turns that angle forces counted.
 
     lane: of the model; forces and accelerations are available in any lane, all else in the first. one_sided: whether
-    the caller sees to contacts, which are open unless their state is put in (`contacts`). Raises InputError else.
+    the caller sees to contacts, which are open unless their state is put in (`contacts`); held: whether it takes
+    samples as what they begin with. Raises InputError else.
     """
 
-    def __init__(self, model: Model, lane: int = 0, *, one_sided: bool = False) -> None:
+    def __init__(self, model: Model, lane: int = 0, *, one_sided: bool = False, held: bool = False) -> None:
+        if not held:
+            law = "reactions, sensors, equilibria, modes and channels of signals are of laws in continuous time"
+            refuse_sampled(model.scene, law)
         if model.gaps.size and not one_sided:
             raise InputError(
                 f"{model.gap_fields[0]}: motions, reactions, sensors, equilibria and modes take one-sided constraints, "

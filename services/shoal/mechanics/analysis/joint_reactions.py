@@ -373,7 +373,7 @@ def _state(one: ContactForce) -> str:
 
 def require_unique_friction(model: Model) -> None:
     """Raises InputError where friction depends on the force of a joint that other joints may bear as well."""
-    evaluator = Evaluator(model, one_sided=True)
+    evaluator = Evaluator(model, one_sided=True, held=True)
     sharing = _sharing(evaluator, model.q0[:, 0], 0.0)
     firsts, counts = (*model.rubbing.first, *model.gaps.held), (*model.rubbing.parts, *model.gaps.parts)
     for first, parts in zip(firsts, counts, strict=True):
