@@ -102,6 +102,7 @@ def measured(model: Model) -> list[str]:
         return []
     loads = Loads(model.stated, place(model.stated), RowAllocator(0), 0.0)
     loads.signals.record()
+    loads.signals.sample()
     return loads.signals.measures.names
 
 

@@ -173,8 +173,7 @@ class Runs:
             facts |= {"unclear_contacts": unclear} if unclear else {}
         if largest[CLOSENESS] > 0.0:
             facts["distance_from_singular"] = float(largest[CLOSENESS] ** -0.5)
-        goes_on = left and not any(findings) and not moved.clocks  # it does not tell what is held
-        ended = Ended(moved, end, *left[0], motion[-1, :, d, 0].copy()) if goes_on else None
+        ended = Ended(moved, end, *left[0], motion[-1, :, d, 0].copy()) if left and not any(findings) else None
         return Trajectory(
             engine="gauss",
             times=times,

@@ -16,7 +16,6 @@ from pydantic import Discriminator, Tag
 
 from shoal.errors import InputError
 from shoal.scene import expression, formula
-from shoal.scene.ended import End
 from shoal.scene.formula import MEASURES, Measure, Node, leaves
 from shoal.scene.function import SignalFunction
 from shoal.scene.joints import GROUND, Attachment, Coupling, Cylindrical, DrivenAngle, Revolute, Slider
@@ -84,8 +83,6 @@ def check_signals(scene: Any) -> None:
             raise ValueError(f"states.{name}: there is a signal of this name; use another one")
     for where, function in signal_functions(scene):
         check_leaves(scene, where, function)
-    if isinstance(scene.initial_from, End):
-        refuse_sampled(scene, "what it holds at the end of a run is not known", ValueError)
     size, depth = dict[str, int](), dict[str, int]()
     for name in _order(scene.signals):
         function = formula_of(scene.signals[name])
@@ -164,12 +161,12 @@ def sampled_parts(scene: Any) -> dict[str, Sampled | SampledState]:
     return {name: one for name, one in [*order, *scene.states.items()] if isinstance(one, Sampled | SampledState)}
 
 
-def refuse_sampled(scene: Any, why: str, error: type[Exception] = InputError) -> None:
-    """Raises InputError, or another error, where a scene has sampled signals or states."""
+def refuse_sampled(scene: Any, why: str) -> None:
+    """Raises InputError where a scene has sampled signals or states."""
     for part in ("signals", "states"):
         for name, one in getattr(scene, part).items():
             if isinstance(one, Sampled | SampledState):
-                raise error(f"{part}.{name}: sampled every {one.period:g} s: {why}")
+                raise InputError(f"{part}.{name}: sampled every {one.period:g} s: {why}")
 
 
 def formula_of(signal: Any) -> Any:
