@@ -270,7 +270,7 @@ def test_what_cannot_be_coupled_is_refused_by_its_field(terms: list[dict[str, An
 def test_a_distance_without_a_direction_is_refused() -> None:
     data = eyes(2).model_dump(mode="json", exclude_unset=True)
     data["initial"]["a"] = {"position": [0.0, 0.0]}
-    with pytest.raises(InputError, match=r"joints.rope: a distance that it counts is 0 at the start"):
+    with pytest.raises(InputError, match=r"joints.rope: two places that follow each other are 0 m apart at the start"):
         simulate(Scene.parse(data), np.array([0.0]))
 
 

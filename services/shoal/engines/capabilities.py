@@ -9,7 +9,7 @@ from shoal.engines.contract import Engine
 from shoal.engines.known import ENGINES
 from shoal.errors import InputError
 from shoal.scene import GROUND, Coupling, Function, Joint, Load, PointMass, Rod, Scene, SignalFunction
-from shoal.scene.joints import places
+from shoal.scene.joints import Rope, places
 from shoal.scene.signals import depends_on_time, sampled_parts
 
 T = TypeVar("T")
@@ -92,7 +92,7 @@ def needs(scene: Scene) -> Iterator[tuple[str, str]]:
         yield f"ground_points.{name}", "moving ground points"
     for name, joint in scene.joints.items():
         yield from _item(f"joints.{name}", joint)
-        if not isinstance(joint, Coupling) and joint.first.body == joint.second.body:
+        if not isinstance(joint, Coupling | Rope) and joint.first.body == joint.second.body:
             yield f"joints.{name}", "closed rods"
     yield from ((f"joints.{name}", "closed loops") for name in loops(scene))
     for name, contact in scene.contacts.items():
@@ -114,7 +114,7 @@ def needs(scene: Scene) -> Iterator[tuple[str, str]]:
 def _item(where: str, item: Joint | Load) -> Iterator[tuple[str, str]]:
     """The kind of a joint or a load, and what its fields need beyond that."""
     # A rope or a strut is no bar.
-    one_sided = getattr(item, "keeps", "exactly") != "exactly"
+    one_sided = getattr(item, "keeps", "exactly") != "exactly" and not isinstance(item, Rope)
     yield (f"{where}.keeps", "one-sided distances") if one_sided else (where, item.kind)
     for field, value in item:
         if field == "stick" and value == "exact":

@@ -1,4 +1,4 @@
-"""Tendons: straight ones, as springs and distances."""
+"""Tendons: straight ones as springs and distances, those over several sites as ropes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ def add_tendons(source: Source, parts: Parts) -> None:
     for number, name in enumerate(names):
         low, high = source.model.tendon_lengthspring[number]
         if not _is_straight(source, number) or low != high:
-            _tell(source, number, name, parts)
+            if not _reeved(source, number, name, lengths, parts):
+                _tell(source, number, name, parts)
             continue
         parts.left_out += [f"tendon {name}: its {what}" for what in _further(source, number)]
         first = source.model.tendon_adr[number]
@@ -35,6 +36,36 @@ def add_tendons(source: Source, parts: Parts) -> None:
             load = {"kind": "spring", **sides, **acts, "length": float(low)}
             called = name if name not in parts.loads else f"{name}-tendon"
             parts.loads[called], parts.origin[f"loads.{called}"] = load, f"tendon {name}"
+
+
+def _reeved(source: Source, number: int, name: str, lengths: dict[int, int], parts: Parts) -> bool:
+    """Add ropes for a tendon over sites, of its largest length, its kept one or a spring that only pulls.
+
+    Return whether they are all that it does.
+    """
+    model, start = source.model, float(source.data.ten_length[number])
+    first, count = model.tendon_adr[number], model.tendon_num[number]
+    low, high = map(float, model.tendon_lengthspring[number])
+    least, most = map(float, model.tendon_range[number])
+    acts, limited = _law(source, number), bool(model.tendon_limited[number])
+    springs = bool(acts) and low <= 0.0 < high
+    if not np.all(model.wrap_type[first : first + count] == source.mujoco.mjtWrap.mjWRAP_SITE):
+        return False
+    if (acts and not (springs and {*acts} == {"stiffness"})) or (limited and not least <= 0.0 < start <= most):
+        return False
+    if _further(source, number):
+        return False
+    begin, *over, end = (source.at_site(site) for site in model.wrap_objid[first : first + count])
+    rope = {"kind": "rope", "first": begin, "second": end} | ({"over": over} if over else {})
+    wanted = {"length": rope | {"keeps": "exactly"}} if number in lengths else {}
+    wanted |= {"at-most": rope | {"length": most}} if limited else {}
+    law = {"stiffness": acts.get("stiffness"), "exponent": 1.0}
+    wanted |= {"spring": rope | {"length": high, "law": law}} if springs else {}
+    if number in lengths:
+        parts.kept.add(lengths[number])
+    for suffix, one in wanted.items():
+        parts.joints[f"{name}-{suffix}"], parts.origin[f"joints.{name}-{suffix}"] = one, f"tendon {name}"
+    return True
 
 
 def _tell(source: Source, number: int, name: str, parts: Parts) -> None:

@@ -53,6 +53,24 @@ JAMMED_JOINT = _rejects(
     "No force of a joint, or several, agree with the friction that depends on it (Painleve's paradox).",
     "a smaller mu, or another position",
 )
+ROPE_LEAVES = _rejects(
+    "rope-leaves",
+    Status.FAILED,
+    "A rope leaves a pulley or drum that the scene has it go over: its angle of contact is below zero.",
+    "leave that pulley out of `over`, end the run before (solver.duration), or state the turns around it",
+)
+SPAN_VANISHES = _rejects(
+    "span-vanishes",
+    Status.FAILED,
+    "Two places that follow each other on a rope, or whose distance a coupling counts, meet or overlap.",
+    "end the run before (solver.duration), or add a contact or stop that keeps them apart",
+)
+SLACK = _rejects(
+    "slack",
+    Status.FAILED,
+    "A rope that keeps its length exactly would have to push.",
+    "keeps: at-most, with which it goes slack",
+)
 TOO_MANY_EVENTS = _rejects(
     "too-many-events",
     Status.FAILED,

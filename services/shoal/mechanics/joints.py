@@ -15,6 +15,7 @@ import numpy as np
 from shoal.errors import InputError
 from shoal.mechanics.conditions import JointCondition, UnitVectors
 from shoal.mechanics.numerics.tile import Number
+from shoal.mechanics.ropes import Reeved, parts_of_rope
 from shoal.mechanics.sums import BodyAngle, Sum, parts_of
 from shoal.scene import Function, Scene
 from shoal.scene.joints import (
@@ -29,6 +30,7 @@ from shoal.scene.joints import (
     Perpendicular,
     Planar,
     Revolute,
+    Rope,
     Slider,
     Spherical,
     Universal,
@@ -253,6 +255,7 @@ CONDITIONS: dict[type, Callable[[Any], list[JointCondition]]] = {
     Distance: lambda joint: [Apart(joint.first, joint.second, joint.length)] if joint.keeps == "exactly" else [],
     Parallel: lambda joint: [Turned(joint.first, joint.second, either=(0.0, np.pi))],
     Perpendicular: lambda joint: [Turned(joint.first, joint.second, either=(np.pi / 2, -np.pi / 2))],
+    Rope: lambda joint: [Reeved(tuple(parts_of_rope(joint)), joint.keeps == "exactly")],
     DrivenAngle: lambda joint: [Turned(joint.first, joint.second, joint.angle)],
     Gear: _gear,
     Coupling: lambda joint: [Sum(parts_of(joint.terms), joint.sum)],
@@ -285,6 +288,7 @@ SPATIAL: dict[type, Callable[[Any], list[JointCondition]]] = {
     Distance: CONDITIONS[Distance],
     Parallel: lambda j: [Aligned(j.first, j.second, None)],
     Perpendicular: lambda j: [Square(j.first, j.second, None, None)],
+    Rope: CONDITIONS[Rope],
     DrivenAngle: lambda j: [Hinged(j.first, j.second, j.angle, j.axis)],
     Gear: _gear,
     Coupling: CONDITIONS[Coupling],

@@ -18,6 +18,7 @@ from shoal.compile import structures
 from shoal.compile.pointers import pointer, raw
 from shoal.errors import InputError
 from shoal.mechanics import saddle
+from shoal.mechanics.affine import Affine
 from shoal.mechanics.applied import Applied
 from shoal.mechanics.constraints import Constraints
 from shoal.mechanics.derived import Derived
@@ -179,6 +180,12 @@ class Model:
     probed: tuple[int, ...]
     slowed: int = 0
     marker_angles: Array | None = None
+    tensions: dict[str, list[int]] = field(default_factory=dict, compare=False)
+    """Of ropes that keep their length exactly, the constraints that keep it."""
+    rope_places: dict[str, tuple[Affine, ...]] = field(default_factory=dict, compare=False)
+    """Of ropes, the places that they go over, ends included."""
+    spans: tuple[tuple[str, int], ...] = ()
+    """Lengths that may not vanish, by their joint and unknown."""
     shared_tiles: dict[int, Arrays] = field(default_factory=dict, compare=False, repr=False)
     """Arrays by tile width, where no number but the initial state depends on the lane."""
 

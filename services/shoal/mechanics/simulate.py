@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -48,22 +49,32 @@ def simulate(
     begin, end = clock.now(), float(times[-1])
     if not values:
         own = runs(machine or Machine.of(scene), scene.solver, end)
-        return own.run(times, threads=threads, seek=seek, begin=begin, whole=whole)
+        return _run(own, times, threads=threads, seek=seek, begin=begin, whole=whole)
     lanes = len(next(iter(values.values())))
     found = scene.initial_from is not None
     starting = all(path.startswith("initial.") for path in values) and not found
     if starting and not start.gives_numbers(scene):
         own = runs(machine or Machine.of(scene), scene.solver, end)
-        return own.run(times, own.starts.at(values, lanes), threads=threads, begin=begin, whole=whole)
+        return _run(own, times, own.starts.at(values, lanes), threads=threads, begin=begin, whole=whole)
     model = build(scene.with_lanes(values), lanes, max(end, scene.solver.duration))
     same = _runs_if_any(machine or Machine.of(scene), scene.solver, end) if starting else None
     if same is not None and model.differs_in_start_only(same.model):  # joints take nothing else from the start
-        return same.run(times, model, threads=threads, begin=begin, whole=whole)
+        return _run(same, times, model, threads=threads, begin=begin, whole=whole)
     each = ({path: float(numbers[lane]) for path, numbers in values.items()} for lane in range(lanes))
     model = _begun(model, [scene.with_values(one) for one in each] if found else [])
     model = _as_moved(model, scene.solver)
     choice = pick(scene.solver, model, step_limit if end > 0 else _unlimited)
-    return Runs(scene, model, choice, alone=False).run(times, threads=threads, begin=begin, whole=whole)
+    own = Runs(scene, model, choice, alone=False)
+    return _run(own, times, threads=threads, begin=begin, whole=whole)
+
+
+def _run(own: Runs, times: Array, model: Model | None = None, *, whole: bool, **options: Any) -> Trajectory:
+    """Return a motion; of machines with ropes with what is found out about these at more times."""
+    if not own.model.spans or not float(times[-1]) > 0.0:
+        return own.run(times, model, whole=whole, **options)
+    from shoal.mechanics.rope_checks import run_watched
+
+    return run_watched(lambda every: own.run(every, model, whole=True, **options), times, own.scene, whole)
 
 
 def runs(machine: Machine, solver: Solver, end: float) -> Runs:

@@ -92,11 +92,11 @@ class Sum(JointCondition):
                 pairs.append((line * factor, way))
             elif _kind(one) == "distance":
                 gap = _gap(bodies, one)
-                length = bodies.length(name, gap)
-                if length is None:
-                    roots.append((factor, gap))
+                span = bodies.span(name, gap, 0.0)
+                if span is None:
+                    roots.append((factor, gap, 0.0))
                 else:
-                    total = total + length * factor
+                    total = total + span[0] * factor
             else:
                 side, axis = coordinate(bodies.scene, one)
                 onto_first = np.outer(first.constant, np.eye(len(first.constant))[axis])

@@ -28,9 +28,10 @@ class TermValues:
         vectors = [*((row, u) for row, (u, _, _) in products), *((row, w) for row, (_, w, _) in products)]
         vectors += [(row, vector) for row, _, vector in angles]
         roots = [(row, *part) for row, one in enumerate(terms) for part in one.roots]
-        vectors += [(row, vector) for row, _, vector in roots]
+        vectors += [(row, vector) for row, _, vector, _ in roots]
         self._rooted = np.array([[row == one for one in range(len(terms))] for row, *_ in roots], dtype=float)
-        self._scales = laned([np.atleast_1d(factor) for _, factor, _ in roots], ())
+        self._scales = laned([np.atleast_1d(factor) for _, factor, _, _ in roots], ())
+        self._offsets = laned([np.atleast_1d(c) for *_, c in roots], ())
         self._products = _index([row for row, _ in products])
         self._angled = np.array([[row == one for one in range(len(terms))] for row, *_ in angles], dtype=float)
         self._factors = laned([np.atleast_1d(factor) for _, factor, _ in angles], ())
@@ -54,14 +55,14 @@ class TermValues:
     def of_lanes(self, lanes: Index) -> TermValues:
         """Return the terms of some lanes."""
         other = copy(self)
-        for name in ("_constant", "offset", "_coefficients", "_factors", "_scales"):
+        for name in ("_constant", "offset", "_coefficients", "_factors", "_scales", "_offsets"):
             setattr(other, name, of_lanes(getattr(self, name), lanes))
         return other
 
     def at(self, q: Array) -> tuple[Array, Array]:
         """Return the values, and the parts of the Jacobian, (lanes, parts), which add up."""
         count = len(self._products)
-        each = (q, self._constant, self.offset, self._coefficients, self._factors, self._scales)
+        each = (q, self._constant, self.offset, self._coefficients, self._factors, self._scales, self._offsets)
         lanes = max(map(len, each))
         vectors = np.repeat(self._constant, lanes // len(self._constant), axis=0)
         steps = self._coefficients * q[:, self.unknowns, None]
@@ -85,11 +86,9 @@ class TermValues:
         gaps = vectors[:, turning:]
         by_gap = np.zeros_like(gaps)
         if len(self._rooted):
-            length = np.sqrt(np.sum(gaps * gaps, axis=2))
-            values = values + (self._scales * length) @ self._rooted
-            axis = np.eye(gaps.shape[2])[0]  # of places that coincide
-            safe = np.where(length > 0, length, 1.0)[..., None]
-            by_gap = self._scales[..., None] * np.where(length[..., None] > 0, gaps / safe, axis)
+            spans, along = _spans(gaps, self._offsets)
+            values = values + (self._scales * spans) @ self._rooted
+            by_gap = self._scales[..., None] * along
         by_vector = np.concatenate([by_u, by_w, by_turned, by_gap], axis=1)
         return values + self.offset, np.sum(by_vector[:, self._numbers] * self._coefficients, axis=2)
 
@@ -103,6 +102,23 @@ class TermValues:
         for part in self.groups:
             dense[:, self.rows[part], self.unknowns[part]] += slopes[:, part]
         return dense
+
+
+def _spans(gaps: Array, offsets: Array) -> tuple[Array, Array]:
+    """Return s + c angle(t) of spans between circles (`ropes`), and t, their gradient by the vectors between centres.
+
+    gaps: (lanes, spans, d); offsets: c, (lanes or 1, spans). Places that coincide have the first axis as direction.
+    """
+    size = np.sqrt(np.sum(gaps * gaps, axis=2))
+    safe = np.where(size > 0, size, 1.0)[..., None]
+    along = np.where(size[..., None] > 0, gaps / safe, np.eye(gaps.shape[2])[0])
+    if not np.any(offsets):
+        return size, along
+    straight = np.sqrt(np.maximum(size**2 - offsets**2, 0.0))
+    turn = np.arctan2(offsets, straight)
+    x, y = along[..., 0], along[..., 1]
+    along = np.stack([x * np.cos(turn) - y * np.sin(turn), y * np.cos(turn) + x * np.sin(turn)], axis=-1)
+    return straight + offsets * np.arctan2(along[..., 1], along[..., 0]), along
 
 
 def _links(vectors: list[tuple[int, Affine]], dimensions: int) -> tuple[Index, Index, Index, Array, list[slice]]:

@@ -26,7 +26,8 @@ class Term:
     form: (d, d). lengths: the power of a length that it is measured in. angles: factors and unit vectors whose angles
     [rad] are counted, in space in coordinates whose third axis is that which they turn about. period: of a term with
     angles, multiples of which make no difference. of_start: whether the constant is such that it vanishes at the start.
-    further: pairs of vectors whose scalar products add. roots: factors and vectors of separate bodies whose lengths add
+    further: pairs of vectors whose scalar products add.
+    roots: factors, vectors of separate bodies and c of the spans (`ropes`) that add
     """
 
     name: str
@@ -40,7 +41,7 @@ class Term:
     period: Number = 1.0
     of_start: bool = False
     further: tuple[tuple[Affine, Affine], ...] = ()
-    roots: tuple[tuple[Number, Affine], ...] = ()
+    roots: tuple[tuple[Number, Affine, Number], ...] = ()
 
     @property
     def pairs(self) -> list[tuple[Affine, Affine, Array]]:
@@ -104,6 +105,8 @@ class Terms:
         self.held: list[Term] = []
         self.pressed: dict[str, tuple[int, int]] = {}
         """Joints whose force is asked for: the first of their constraints and how many they are."""
+        self.tensions: dict[str, list[int]] = {}
+        """Of ropes that keep their length exactly, the constraints that keep it."""
 
     def dot(
         self, name: str, u: Affine, w: Affine, lengths: int, constant: Number = 0.0, drive: Composed | None = None
@@ -126,12 +129,12 @@ class Terms:
         *,
         angles: Iterable[tuple[Number, Affine]] = (),
         period: Number = 1.0,
-        roots: Iterable[tuple[Number, Affine]] = (),
+        roots: Iterable[tuple[Number, Affine, Number]] = (),
         lengths: int = 0,
         drive: Composed | None = None,
         of_start: bool = True,
     ) -> None:
-        """Sum of scalar products u . w, factor * angle of unit vector and factor * length, + drive(t) = 0.
+        """Sum of scalar products u . w, factor * angle of unit vector and factor * span, + drive(t) = 0.
 
         Multiples of the period of sums with angles make no difference. lengths: the power of a length that it is
         measured in; of_start: whether it stays what it is at the start

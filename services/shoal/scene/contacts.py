@@ -10,8 +10,9 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
+from shoal.scene.attachments import origin_of_ground
 from shoal.scene.contact_law import ContactLaw
-from shoal.scene.joints import Attachment, origin_of_ground
+from shoal.scene.joints import Attachment
 from shoal.scene.polygons import check_polygon
 from shoal.scene.record import Angle, Axis, NonNegative, Positive, Record
 

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BeforeValidator
 
+from shoal.scene.joints import sides
 from shoal.scene.record import Record
 
 SPATIAL_KINDS = ("spherical", "universal", "cylindrical", "planar")
@@ -33,12 +34,16 @@ def check_dimensions(scene: Any) -> None:
         _check_plane(scene, "")
         return
     for name, joint in scene.joints.items():
-        if joint.kind != "coupling" and joint.first.body == joint.second.body:
+        if joint.kind not in ("coupling", "rope") and joint.first.body == joint.second.body:
             raise ValueError(f"joints.{name}: closes {joint.first.body!r} upon itself; that is for the plane")
     for name, load in scene.loads.items():
         for field in ("first_to", "second_to"):
             if getattr(load, field, None) is not None:
                 raise ValueError(f"loads.{name}.{field}: is for scenes in the plane; say dimensions: 2")
+    for name, joint in scene.joints.items():
+        for path, place in sides(joint).items() if joint.kind == "rope" else ():
+            if np.any(getattr(place, "radius", 0.0)):
+                raise ValueError(f"joints.{name}.{path}.radius: in space a rope goes over eyes, without a radius")
     flat = is_flat(scene)
     for name, start in scene.initial.items():
         for one, other in (("angle", "rotation"), ("rate", "spin")):

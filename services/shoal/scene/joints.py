@@ -1,4 +1,4 @@
-"""Joints, and the attachments by which joints, loads and markers name a place on a body."""
+"""Joints."""
 
 from __future__ import annotations
 
@@ -11,67 +11,20 @@ import numpy.typing as npt
 from pydantic import BeforeValidator, Field, model_validator
 
 from shoal.errors import InputError
+from shoal.scene.attachments import GROUND as GROUND
+from shoal.scene.attachments import Attachment as Attachment
+from shoal.scene.attachments import Direction as Direction
+from shoal.scene.attachments import DirectionTie as DirectionTie
+from shoal.scene.attachments import MovingPoint as MovingPoint
+from shoal.scene.attachments import Tie as Tie
+from shoal.scene.attachments import Z as Z
 from shoal.scene.contact_law import ContactLaw
 from shoal.scene.formula import Measure, tree
 from shoal.scene.function import Function
-from shoal.scene.record import Angle, Axis, NonNegative, Positive, Record, Vector, Vector3, kinds
+from shoal.scene.record import Angle, Axis, NonNegative, Positive, Record, Vector3, kinds
+from shoal.scene.ropes import Rope as Rope
 
 Array = npt.NDArray[np.float64]
-
-GROUND = "ground"
-Z: Vector3 = (0.0, 0.0, 1.0)
-
-
-class Attachment(Record):
-    """A place on a body: a named point, or coordinates in the body's frame [m].
-
-    On the ground, coordinates are fixed, and a name is that of one of the scene's moving points.
-    """
-
-    body: str
-    """Name of the body, or `ground`."""
-    point: str | Vector = "start"
-    """Named point, or coordinates in the body's frame [m]; on a flexible rod the arc length and 0."""
-
-
-def origin_of_ground(place: Any) -> Any:
-    """Return a place with the origin for its point, if it names the ground and no point of it."""
-    return {"point": (0.0, 0.0), **place} if isinstance(place, dict) and place.get("body") == GROUND else place
-
-
-Direction = Annotated[Attachment, BeforeValidator(origin_of_ground)]
-"""An attachment of whose body only the direction matters: on the ground the point may be left out."""
-
-
-class MovingPoint(Record):
-    """A point of the ground that moves."""
-
-    x: Function = Function(number=0.0)
-    """Coordinate x [m] as a function of time."""
-    y: Function = Function(number=0.0)
-    """Coordinate y [m] as a function of time."""
-    z: Function = Function(number=0.0)
-    """Coordinate z [m] as a function of time, in space."""
-
-
-class Tie(Record):
-    """Joins two places. turned: the sides of whose bodies' directions it speaks."""
-
-    kind: str
-    turned: ClassVar[tuple[str, ...]]
-    first: Attachment
-    """Place on the first body."""
-    second: Attachment
-    """Place on the second body."""
-
-
-class DirectionTie(Tie):
-    """Joins the directions of two bodies, independent of the places."""
-
-    first: Direction
-    """The first body."""
-    second: Direction
-    """The second body."""
 
 
 class Stops(Record):
@@ -519,6 +472,7 @@ Joint = Annotated[
         | Distance
         | Parallel
         | Perpendicular
+        | Rope
         | DrivenAngle
         | Gear
         | Coupling,
@@ -548,7 +502,9 @@ def sides(record: Record) -> dict[str, Attachment]:
         if isinstance(value, Attachment):
             found[field] = value
         for number, part in enumerate(value if isinstance(value, tuple) else ()):
-            if isinstance(part, Record):
+            if isinstance(part, Attachment):
+                found[f"{field}.{number}"] = part
+            elif isinstance(part, Record):
                 found |= {f"{field}.{number}.{inner}": at for inner, at in sides(part).items()}
     return found
 
@@ -562,12 +518,14 @@ def turned(joint: Joint) -> dict[str, Attachment]:
     """The attachments of whose bodies' directions a joint speaks, by the path of their field."""
     if isinstance(joint, Weld) and joint.angle is None:
         return {}
+    if isinstance(joint, Rope):
+        return dict(joint.drums())
     return {side: getattr(joint, side) for side in joint.turned}
 
 
 def is_one_sided(joint: Any) -> bool:
     """Return whether a joint has stops, play or backlash, is a rope or a strut, or has dry friction that sticks."""
-    if isinstance(joint, Distance):
+    if isinstance(joint, Distance | Rope):
         return joint.keeps != "exactly"
     limits = any(getattr(joint, field, None) is not None for field in ("stops", "play", "backlash"))
     return limits or getattr(joint, "stick", "smooth") == "exact"

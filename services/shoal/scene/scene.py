@@ -155,7 +155,7 @@ class Scene(Record):
                 self._check_attachment(f"joints.{name}.{field}", side)
             if isinstance(joint, joint_types.Coupling):
                 check_coupling(self, name, joint)
-            elif joint.first.body == joint.second.body:
+            elif not isinstance(joint, joint_types.Rope) and joint.first.body == joint.second.body:
                 body = self.bodies.get(joint.first.body)
                 if body is None or body.element in FRAMED:
                     raise ValueError(

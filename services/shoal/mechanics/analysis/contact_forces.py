@@ -10,7 +10,7 @@ import numpy as np
 from shoal.mechanics import plane
 from shoal.mechanics.analysis.evaluate import Pressing
 from shoal.mechanics.analysis.free_motion import FreeMotion
-from shoal.mechanics.analysis.joint_forces import Component, of_condition, pair
+from shoal.mechanics.analysis.joint_forces import Component, of_condition, pair, tension
 from shoal.mechanics.gaps import RIGID, SLIP, STICK, Gaps
 from shoal.mechanics.joints import conditions
 from shoal.mechanics.model import Model
@@ -114,6 +114,10 @@ def _unit(motion: FreeMotion, name: str, joint: Any, field: str) -> tuple[Compon
         (condition,) = conditions(tight, motion.dimensions)
         (unit,) = of_condition(motion, name, condition)
         return unit._replace(name="backlash"), 1.0 / condition.scale
+    if field.startswith("tension"):
+        (condition,) = conditions(joint, motion.dimensions)
+        unit = tension(motion, name, condition, int(field.removeprefix("tension") or 1) - 1)
+        return unit, -1.0  # the length has an upper limit
     if field == "keeps":
         way = motion.gap(joint)
         return pair(motion, name, "axial", joint, way / np.linalg.norm(way, axis=1, keepdims=True), None), 1.0

@@ -17,9 +17,12 @@ from shoal.mechanics.analysis.free_motion import FreeMotion
 from shoal.mechanics.assembly.phases import free_motion
 from shoal.mechanics.frames import BeamFrame, Frame, ModalFrame, PointFrame
 from shoal.mechanics.numerics.tile import Array, Index
+from shoal.mechanics.rope_path import tangents
+from shoal.mechanics.ropes import Reeved
 from shoal.mechanics.sums import BodyAngle, Measured, Sum, angle_sides, axis_of_angle, coordinate, ends, line_of
 from shoal.scene import Revolute, Slider
 from shoal.scene.formula import Measure
+from shoal.scene.joints import Z
 
 
 class Component(NamedTuple):
@@ -55,6 +58,8 @@ def of_condition(motion: FreeMotion, name: str, condition: Any) -> Iterator[Comp
     """Yield the unknowns of one condition of a joint."""
     if isinstance(condition, Sum):
         yield _summed(motion, name, condition)
+    elif isinstance(condition, Reeved):
+        yield from (tension(motion, name, condition, k) for k in range(len(condition.parts)) if condition.holds)
     else:
         pushes = condition.pushes(motion)
         twists = _resisted(motion, condition, condition.twists(motion))
@@ -129,6 +134,29 @@ def _measured(motion: FreeMotion, joint: str, label: str, one: Measured) -> Comp
     sides, is_plane = angle_sides(scene, one), motion.turn_axes == 1
     torque = motion.turns["torque"] if is_plane else motion.common_axis(*sides, axis_of_angle(scene, one))
     return Component(joint, label, _along(torque, motion.turn(sides[1]) - motion.turn(sides[0])), none, torque)
+
+
+def tension(motion: FreeMotion, joint: str, condition: Reeved, number: int) -> Component:
+    """Return the tension of a part of a rope: what pulls the place at its end towards the span before it."""
+    part, placement = condition.parts[number], motion.placement
+    centres = np.stack([motion.place(at) for at in part.places], axis=1)
+    if motion.dimensions == plane.DIMENSIONS:
+        along, _ = tangents(centres, [float(np.max(at.signed_radius)) for at in part.places])
+    else:
+        way = np.diff(centres, axis=1)
+        along = way / np.linalg.norm(way, axis=2, keepdims=True)
+    gradient = np.zeros((len(centres), motion.bodies.unknowns))
+    for k, (one, other, _) in enumerate(part.spans):
+        way = motion.slope(placement.point(motion.scene, other) - placement.point(motion.scene, one))
+        gradient -= along[:, k] @ way
+    torque = np.zeros((len(centres), motion.turn_axes))
+    for drum, factor in part.drums:
+        about = motion.about(drum, Z)
+        gradient -= factor * _along(about, motion.turn(drum))
+        if drum is part.places[-1]:
+            torque = -factor * about
+    label = "tension" + str(number + 1) * (len(condition.parts) > 1)
+    return Component(joint, label, gradient, -along[:, -1], torque)
 
 
 def rotors(motion: FreeMotion, change: Array) -> Array:

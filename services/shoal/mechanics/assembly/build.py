@@ -25,6 +25,7 @@ from shoal.mechanics.reach import span
 from shoal.mechanics.rubbing import Rubbing
 from shoal.scene import GROUND, Distance, Scene
 from shoal.scene.formula import Node
+from shoal.scene.ropes import Rope
 from shoal.scene.signals import following
 
 
@@ -124,6 +125,13 @@ def build(
         kinks=tuple(one.kinks for one in loads.fitted),
         constraints=held,
         constraint_names=tuple(one.name for one in placement.terms.held),
+        tensions=placement.terms.tensions,
+        spans=tuple((one.joint, one.unknowns[0]) for one in placement.lifted if one.span),
+        rope_places={
+            name: tuple(placement.point(scene, at) for at in (rope.first, *rope.over, rope.second))
+            for name, rope in scene.joints.items()
+            if isinstance(rope, Rope)
+        },
         marker_rows=index(marker_rows),
         rubbing=_rubbing(loads, placement.terms.pressed),
         signals=loads.followed(),

@@ -12,10 +12,11 @@ from shoal.errors import InputError
 from shoal.mechanics import cams, plane
 from shoal.mechanics.affine import Affine, fixed
 from shoal.mechanics.assembly.coordinates import Placement
+from shoal.mechanics.assembly.lifted import first_axis
 from shoal.mechanics.assembly.measures import ElementForceLaw, Measures
 from shoal.mechanics.cams import least_radii, segments
 from shoal.mechanics.derived import RowAllocator
-from shoal.mechanics.forces import DISTANCE, LAW, NATURAL, PLACE
+from shoal.mechanics.forces import ANGLE, DISTANCE, LAW, NATURAL, PLACE
 from shoal.mechanics.frames import RigidFrame
 from shoal.mechanics.gaps import DRY, GIVES, LAW_SIZE, LIMIT, PAIR, RIGID, Gaps
 from shoal.mechanics.joints import conditions
@@ -23,6 +24,7 @@ from shoal.mechanics.numerics.tile import Array, Number, index, stacked
 from shoal.mechanics.pairs import FLAT, HOLE, PROFILE, ROUND, Pairs
 from shoal.mechanics.profiles import CORNER, SEGMENT, SIZE, Profiles, chains
 from shoal.mechanics.reach import span
+from shoal.mechanics.ropes import arcs_at_start
 from shoal.mechanics.sums import BodyAngle, Measured, angle_sides, axis_of_angle, coordinate, ends, line_of
 from shoal.scene import (
     GROUND,
@@ -39,7 +41,7 @@ from shoal.scene import (
 )
 from shoal.scene.clearances import contacts_of
 from shoal.scene.formula import Measure
-from shoal.scene.joints import Z, tightened
+from shoal.scene.joints import Rope, Z, tightened
 from shoal.scene.polygons import corners_of, distance, is_concave
 
 RESOLUTION = 1e-12
@@ -78,6 +80,8 @@ class Contacts(Measures):
                 self._stops(name, joint)
             elif isinstance(joint, Distance) and joint.keeps != "exactly":
                 self._rope(name, joint)
+            elif isinstance(joint, Rope) and joint.keeps != "exactly":
+                self._reeved(name, joint)
             elif isinstance(joint, Gear | Coupling) and joint.backlash is not None:
                 self._backlash(name, joint)
         for name, joint in scene.joints.items():
@@ -194,6 +198,38 @@ class Contacts(Measures):
         self._measure(name, DISTANCE, ends, ElementForceLaw(natural=limit), 0.0)
         sign = UPPER if joint.keeps == "at-most" else LOWER
         self._limit(f"joints.{name}.keeps", "", start, sign, limit, joint.restitution)
+
+    def _reeved(self, name: str, joint: Rope) -> None:
+        """Limit the length of each part of a rope over pulleys, as the sum of its spans, arcs and wound ends."""
+        (condition,), axis = conditions(joint, self.scene.dimensions), first_axis(self.scene.dimensions)
+        zero, one = fixed(0.0 * axis), fixed(axis)
+        ground = Attachment(body=GROUND, point=(0.0, 0.0))
+        for number, part in enumerate(condition.parts):
+            first, weights, start = len(self.kinds), list[Number](), np.zeros(1)
+            spans = zip(self.placement.ropes[name, number], part.spans, strict=True)
+            for (length, direction), (_, _, c) in spans:
+                begin = self.placement.start_of(length)[0][0]
+                self._measure(name, PLACE, [zero, length, one], ElementForceLaw(natural=begin), 0.0)
+                weights.append(-1.0)
+                start = start + begin
+                if direction is not None:
+                    x, y = self.placement.start_of(direction)[0]
+                    angle = np.arctan2(y, x)
+                    self._measure(name, ANGLE, [one, direction], ElementForceLaw(natural=angle), angle)
+                    weights.append(-c)
+            for drum, factor in part.drums:
+                if drum.body != GROUND:
+                    self._angle(name, ground, drum, ElementForceLaw(), Z)
+                    self.laws[-LAW + NATURAL] = self.angles[-1]
+                    weights.append(-factor)
+            field = f"joints.{name}.tension" + str(number + 1) * (len(condition.parts) > 1)
+            if joint.length is not None:
+                whole = start + arcs_at_start(joint, self.placement)
+                self.laws[LAW * first + NATURAL] += joint.length - whole
+                if joint.law is None:
+                    self._check(f"joints.{name}.length", whole, joint.length, UPPER)
+            law = None if joint.law is None else joint.law.numbers
+            self._add(field, LIMIT, first, weights, restitution=joint.restitution, law=law)
 
     def _backlash(self, name: str, joint: Gear | Coupling) -> None:
         """Limit the sum that a gear or a coupling keeps to both sides of what it is at the start."""

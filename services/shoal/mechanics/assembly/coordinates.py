@@ -74,6 +74,8 @@ class Placement(LiftedMeasures):
     """Free motions of joints, see `phases`."""
     lifted: list[Lifted] = field(default_factory=list)
     """Measures with unknowns of their own."""
+    ropes: dict[tuple[str, int], list[Any]] = field(default_factory=dict)
+    """Lengths and directions of the spans of ropes, by joint and part."""
 
     def new_vector(self, position: Array, velocity: Array) -> Affine:
         """Add a vector of unknowns with its initial value and rate, (d, lanes) each."""

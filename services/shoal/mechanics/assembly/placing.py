@@ -17,6 +17,7 @@ from shoal.mechanics.assembly.groups import JointPoint, is_stiff, moving
 from shoal.mechanics.fitting import start_slope, start_value
 from shoal.mechanics.frames import PointFrame
 from shoal.mechanics.joints import Along, Turned
+from shoal.mechanics.ropes import Reeved
 from shoal.mechanics.sums import Sum
 from shoal.scene import GROUND, Function, Scene
 
@@ -78,7 +79,7 @@ def _require_able(scene: Scene, name: str, condition: object) -> None:
     if isinstance(condition, Turned) and condition.driven:
         if not all(is_stiff(scene, side.body) for side in (condition.first, condition.second)):
             raise InputError(f"joints.{name}: drives the angle of {flexible}")
-    elif isinstance(condition, Sum) and scene.dimensions == 2:
+    elif isinstance(condition, Sum | Reeved) and scene.dimensions == 2:
         if not all(is_stiff(scene, side.body) for side in condition.turned(scene)):
             raise InputError(f"joints.{name}: turns {flexible}")
     elif isinstance(condition, Along) and scene.dimensions == 3 and not condition.is_fixed:

@@ -23,6 +23,7 @@ from shoal.mechanics.joints import Turned
 from shoal.mechanics.modal import beams
 from shoal.mechanics.modal.beams import Ends
 from shoal.mechanics.numerics.tile import Array, Number
+from shoal.mechanics.ropes import Reeved
 from shoal.mechanics.sums import Sum
 from shoal.scene import ModalBody, Rod, Scene
 
@@ -81,7 +82,7 @@ def held(scene: Scene, name: str) -> Ends:
         return rod.ends
     places: dict[str, bool] = {}
     for _, condition in joints.of_scene(scene):
-        if isinstance(condition, Sum):
+        if isinstance(condition, Sum | Reeved):
             continue
         for side in (condition.first, condition.second):
             if side.body == name:

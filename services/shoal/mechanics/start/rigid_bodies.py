@@ -94,12 +94,13 @@ class RigidBodies:
         """Require the length of a vector [m]; None: that of the start."""
         drive = None if length is None else length.through("neg")
         none = fixed(0.0 * gap.constant)
-        self.terms.sum(name, [(none, none)], roots=[(1.0, gap)], lengths=1, drive=drive, of_start=length is None)
+        roots = [(1.0, gap, 0.0)]
+        self.terms.sum(name, [(none, none)], roots=roots, lengths=1, drive=drive, of_start=length is None)
 
-    def length(self, name: str, gap: Affine) -> None:
-        """Return nothing: lengths of separate bodies are no unknowns."""
+    def span(self, name: str, gap: Affine, c: Number) -> None:
+        """Return nothing: spans between separate bodies are no unknowns."""
 
-    def count(self, name: str, vector: Affine) -> Affine:
+    def count(self, name: str, vector: Affine, lever: Number | None = None) -> Affine:
         """Return the vector whose first component is an angle with all its turns."""
         return vector
 

@@ -25,7 +25,7 @@ from shoal.trajectory import Array
 Gap = Callable[[Array, Array], Array]
 """Residual of a condition [m or rad] at coordinates and rates (rows, unknowns), (rows,)."""
 
-SPATIAL_JOINTS = frozenset(JOINT_KINDS) - {"coupling"}
+SPATIAL_JOINTS = frozenset(JOINT_KINDS) - {"coupling", "rope"}
 
 
 def add_joint(exu: Any, ends: SpatialEnds, name: str, joint: Joint) -> list[Gap]:
