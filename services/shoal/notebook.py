@@ -280,7 +280,15 @@ def linearize(asked: LinearizeRequest) -> LinearModel:
     """
     from shoal.mechanics.linear_model import linearize
 
-    return linearize(machine(asked), list(asked.inputs), list(asked.outputs), about=asked.about, time=asked.time)
+    return linearize(
+        machine(asked),
+        list(asked.inputs),
+        list(asked.outputs),
+        about=asked.about,
+        time=asked.time,
+        loop=asked.loop,
+        require=list(asked.require),
+    )
 
 
 @function(Export)

@@ -9,7 +9,7 @@ else the amplitudes of its modes. About a motion, or where forces do not balance
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal, NamedTuple
 
@@ -21,6 +21,7 @@ from pydantic import ValidationError
 from shoal.arguments import check, one_of
 from shoal.errors import ComputationError, InputError
 from shoal.findings import Concluded, Finding
+from shoal.json_values import plain
 from shoal.mechanics import plane
 from shoal.mechanics.analysis import left_out
 from shoal.mechanics.analysis import modes_findings as kinds
@@ -37,6 +38,7 @@ from shoal.mechanics.analysis.small_motions import BoundedMatrix
 from shoal.mechanics.analysis.statics import seek
 from shoal.mechanics.gaps import DRY
 from shoal.mechanics.machine import Machine
+from shoal.mechanics.margins import MARGINS, Margins, Required, margins, read_all
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
 from shoal.mechanics.simulate import simulate
@@ -67,6 +69,8 @@ COARSE = 1e-3
 """Differences that are apart by more of the largest entry are no derivatives."""
 FAR = 1e-3
 """A zero beyond a thousand times the fastest pole is infinite."""
+DOUBLE = 4.0 * float(np.sqrt(np.finfo(float).eps))
+"""Poles of an open loop below this part of the largest are zero: round-off of a double root, as of two integrators."""
 SAMPLES = 2001
 """Samples of a trajectory, between which no body makes half a turn."""
 CLOSED = 1e-9
@@ -80,6 +84,7 @@ class LinearModel(Concluded):
     a, b, c, d: A, B, C and D; states, inputs, outputs: names of x, u and y, states with their rates second; at: values
     of the outputs in the state that the model is about. poles [1/s]: eigenvalues of A, those that are zero within
     round-off as zeros. error: of A and C, relative to their largest entry. remarks: on the state that it is about.
+    loop: of an open loop the signal where it is broken; closed_poles: then those of the closed one; required: margins.
     """
 
     scene: Scene
@@ -95,16 +100,39 @@ class LinearModel(Concluded):
     error: float
     poles: Complex
     remarks: Sequence[Finding]
+    loop: str = ""
+    closed_poles: Complex | None = None
+    required: Sequence[Required] = ()
+
+    @cached_property
+    def margins(self) -> Margins | None:
+        """Stability margins of the open loop, None of a model of inputs and outputs."""
+        if self.closed_poles is None:
+            return None
+        stable = bool(np.all(self.closed_poles.real < 0.0))
+        return margins(self.a, self.b[:, 0], self.c[0], float(self.d[0, 0]), stable=stable)
 
     @property
     def findings(self) -> list[Finding]:  # type: ignore[override]
-        """Findings about the state, and whether the machine leaves it."""
+        """Findings about the state, and whether the machine leaves it; of an open loop whether the closed one does."""
+        if self.margins is not None:
+            return [*self._of_margins(self.margins), *self.remarks]
         found = []
         growing = self.poles[np.argmax(self.poles.real)] if len(self.poles) else 0.0
         if growing.real > 0.0:
             text = f"it does not stay there: a pole grows with exp(t * {growing.real:.4g}/s)"
             found.append(kinds.UNSTABLE_POLE.found(text, rate=float(growing.real)))
         return [*found, *self.remarks]
+
+    def _of_margins(self, found: Margins) -> Iterator[Finding]:
+        if not found.stable and self.closed_poles is not None:
+            worst = float(np.max(self.closed_poles.real))
+            yield kinds.LOOP_UNSTABLE.found(f"the closed loop is not stable: a pole has the real part {worst:.4g}/s")
+        for one in self.required:
+            if not one.holds(found):
+                value = float(getattr(found, one.quantity))
+                unit = MARGINS[one.quantity].replace("1", "")
+                yield kinds.NOT_MET.found(f"{one.text} does not hold: it is {value:.4g} {unit}".rstrip(), value=value)
 
     @property
     def status(self) -> ModesStatus:
@@ -157,6 +185,7 @@ class LinearModel(Concluded):
             "error": self.error,
             "poles": [[one.real, one.imag] for one in self.poles.tolist()],
             "zeros": None if zeros is None else [[one.real, one.imag] for one in zeros.tolist()],
+            **({"loop": self.loop, "margins": plain(self.margins.to_json())} if self.margins else {}),
         }
 
     def to_control(self) -> Any:
@@ -183,6 +212,8 @@ def linearize(
     *,
     about: Literal["equilibrium", "start", "trajectory"] = "equilibrium",
     time: float = 0.0,
+    loop: str = "",
+    require: Sequence[str] = (),
 ) -> LinearModel:
     """Return the linear model of a machine about its equilibrium, its start, or the state that it has moved to.
 
@@ -193,6 +224,8 @@ def linearize(
     """
     one_of("about", about, ABOUT)
     check(time=time)
+    if loop or require:
+        return _open_loop(scene, loop, inputs, outputs, require, about, time)
     refuse_sampled(
         scene, "linear models are of continuous time; leave the controller out, and take its load as an input"
     )
@@ -255,6 +288,45 @@ def linearize(
         poles=np.sort_complex(np.linalg.eigvals(a).astype(complex)) if poles is None else poles,
         remarks=state.remarks,
     )
+
+
+def _open_loop(
+    scene: Scene,
+    loop: str,
+    inputs: Sequence[str],
+    outputs: Sequence[str],
+    require: Sequence[str],
+    about: Literal["equilibrium", "start", "trajectory"],
+    time: float,
+) -> LinearModel:
+    """Return the open loop L, broken at a signal, about the state of the closed one.
+
+    Of what enters behind the signal, minus what comes back to it: with d added to it, it is y = T d in the closed loop,
+    and L = -T / (1 + T).
+    """
+    required = read_all(require)
+    if not loop:
+        raise InputError("require: margins are of a loop; name the signal where it is broken as `loop`")
+    if inputs or outputs:
+        raise InputError("loop: an open loop has one input and one output, the signal; leave out inputs and outputs")
+    if loop not in scene.signals:
+        raise InputError(f"loop: no signal {loop!r}; there are {', '.join(scene.signals) or 'none'}")
+    inner, outer = (next(one for one in map(f"{name}{{}}".format, range(1, 1000)) if one not in scene.signals)
+                    for name in ("returned", "entered"))  # fmt: skip
+    signals = {**scene.signals, inner: scene.signals[loop], outer: SignalFunction(number=0.0)}
+    signals[loop] = SignalFunction(expression=f"{inner} + {outer}")
+    closed = linearize(scene.model_copy(update={"signals": signals}), [outer], [inner], about=about, time=time)
+    back = 1.0 + float(closed.d[0, 0])
+    if abs(back) < 1e-12:
+        raise InputError(f"loop: {loop} depends on itself at once; break the loop elsewhere")
+    a = closed.a - closed.b @ closed.c / back
+    poles = np.sort_complex(np.linalg.eigvals(a).astype(complex))
+    poles[np.abs(poles) <= DOUBLE * np.max(np.abs(poles), initial=0.0)] = 0.0
+    return replace(
+        closed, scene=scene, a=a, b=closed.b / back, c=-closed.c / back, d=-closed.d / back, inputs=(loop,),
+        outputs=(loop,), poles=poles, loop=loop,
+        closed_poles=closed.poles, required=required,
+    )  # fmt: skip
 
 
 class _State(NamedTuple):

@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import re
 from dataclasses import KW_ONLY
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
-from pydantic import Field as Constraint
+from pydantic import model_validator
 from pydantic.dataclasses import dataclass
 
 from shoal.requests.fields import Instant, OfScene
 from shoal.requests.option import Option
-from shoal.requests.request import STRICT
+from shoal.requests.request import STRICT, wrong
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
 _INPUTS = "Signals, or loads to whose torque or scale something is added."
+_LOOP = "Break the loop at this signal: its open loop, with gain and phase margin."
+_REQUIRE = "Of a loop what must hold: gain_margin, gain_reduction, phase_margin [deg], delay_margin [s]."
 _OUTPUTS = "Formulas of measures and signals; by default the places that are states."
 
 
@@ -32,9 +34,11 @@ def _listed(given: Any) -> list[str]:
 if TYPE_CHECKING:
     Inputs = Sequence[str]
     Outputs = Sequence[str]
+    Requirements = Sequence[str]
 else:
-    Inputs = Annotated[
-        list[str], Constraint(min_length=1), Option(_INPUTS, "NAME,NAME,...", shown="Sequence[str]", text=_listed)
+    Inputs = Annotated[list[str], Option(_INPUTS, "NAME,NAME,...", shown="Sequence[str]", text=_listed)]
+    Requirements = Annotated[
+        list[str], Option(_REQUIRE, '"MARGIN > NUMBER"', many=True, shown="Sequence[str]", text=list)
     ]
     Outputs = Annotated[list[str], Option(_OUTPUTS, "FORMULA,...", shown="Sequence[str]", text=_listed)]
 
@@ -43,7 +47,7 @@ else:
 class Linearize(OfScene):
     """Find the linear model x' = A x + B u, y = C x + D u of a scene, for the design of controllers."""
 
-    inputs: Inputs
+    inputs: Inputs = ()
     outputs: Outputs = ()
     _: KW_ONLY
     about: Annotated[
@@ -51,3 +55,11 @@ class Linearize(OfScene):
         Option("About the equilibrium, the start, or the state that the machine has moved to at --time."),
     ] = "equilibrium"
     time: Annotated[Instant, Option("Loads and drives are those at this time [s].", "T")] = 0.0
+    loop: Annotated[str, Option(_LOOP, "SIGNAL")] = ""
+    require: Requirements = ()
+
+    @model_validator(mode="after")
+    def _inputs_or_a_loop(self) -> Self:
+        if not self.inputs and not self.loop:
+            wrong("inputs", "name one or more signals or loads, or a loop that is broken at a signal")
+        return self

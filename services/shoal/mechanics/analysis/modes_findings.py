@@ -16,6 +16,7 @@ class ModesStatus(StrEnum):
     COARSE = "coarse-mesh"
     UNTOLD = "cannot-be-told"
     UNSTABLE = "unstable"
+    VIOLATED = "requirement-violated"
     MOVING = "moving"
     UNBALANCED = "unbalanced"
 
@@ -67,6 +68,10 @@ ABOUT_DOUBTED = Kind(
 )
 FRICTION_LEFT_OUT = Kind("friction-left-out", Severity.CAUTION, "Dry friction is not part of small motions.")
 UNSTABLE_POLE = Kind("unstable-pole", Severity.CAUTION, "A pole of a linear model grows: the machine leaves its rest.")
+LOOP_UNSTABLE = _rejects("loop-unstable", ModesStatus.UNSTABLE, "The closed loop is not stable: there are no margins.")
+NOT_MET = _rejects(
+    "margin-below", ModesStatus.VIOLATED, "A margin of the loop is not as required.", "change the gains of the loop"
+)
 ON_A_KINK = Kind(
     "on-a-kink", Severity.CAUTION, "A signal of a linear model is where its derivative jumps; one side is taken."
 )

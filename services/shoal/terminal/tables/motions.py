@@ -244,6 +244,11 @@ def linear_table(found: LinearModel) -> None:
         screen.say(
             f"zeros [1/s]: {', '.join(_complex(one) for one in found.zeros.tolist() if one.imag >= 0.0) or 'none'}"
         )
+    if (margins := found.margins) is not None and margins.stable:
+        screen.say(
+            f"margins of the loop at {found.loop}: gain {margins.gain_margin:.6g}, phase {margins.phase_margin:.6g} "
+            f"degrees, delay {margins.delay_margin:.6g} s; the gain may fall to {margins.gain_reduction:.6g}"
+        )
     screen.findings(found)
 
 
