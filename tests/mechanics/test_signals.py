@@ -354,6 +354,7 @@ def test_equal_parts_are_evaluated_once() -> None:
         ({"torque": "angle(hinge, x)"}, "angle takes the name of a part"),
         ({"torque": "angle(2*hinge)"}, "angle takes the name of a part"),
         ({"torque": "angle(" + "-" * 300 + "x)"}, "angle takes the name of a part"),
+        ({"torque": "force(hinge, x)"}, "force depends on the forces of the same instant"),
         ({"torque": "position(tip, z)"}, "the axis is x or y, found 'z'"),
         ({"torque": "distance(tip, tip)"}, "both are one place"),
         ({"torque": "velocity(top, x)"}, "no marker, body or point of the ground 'top'; there are tip"),

@@ -58,6 +58,8 @@ _LONGEST = 500
 _DEEPEST = 100
 
 
+AT_ONCE = ("acceleration", "force", "energy")
+"""Measures that no formula knows."""
 NONE: Mapping[str, int] = MappingProxyType({})
 
 
@@ -158,6 +160,11 @@ def _check_plain(node: ast.AST, text: str) -> None:
 
 def _check_call(node: ast.Call, text: str) -> None:
     name = node.func.id if isinstance(node.func, ast.Name) else None
+    if name in AT_ONCE:
+        raise InputError(
+            f"expression: {name} depends on the forces of the same instant, which formulas would decide on; it is not "
+            "known in formulas. Take rates, or what a state or a sample keeps of them"
+        )
     if name not in ONE and name not in MANY:
         raise InputError(f"expression: {text!r} calls what is none of {', '.join([*ONE, *MANY])}")
     if node.keywords or (len(node.args) != 1 if name in ONE else len(node.args) < 2):
