@@ -157,6 +157,36 @@ def test_laws_of_ones_own_are_samples_of_signals() -> None:
     assert found.points[:, 0, 0, 0] == pytest.approx(exact, abs=1e-12)
 
 
+@pytest.mark.parametrize("integrator", ["dop853", "leapfrog", "generalized-alpha"])
+def test_an_accelerometer_shows_what_the_command_before_did(integrator: str) -> None:
+    """u_k = 3 - 0.4 m a_k with a_k = u_(k-1)/m, and 0 at the start; of a body that a command does not move at first."""
+    signals = {"a": "acceleration(mass, x)", "u": {"sample": "3 - 0.8*a", "period": 0.1}}
+    commands = [0.0]
+
+    def law(k: int, x: float, v: float) -> float:
+        commands.append(3 - 0.4 * commands[-1])
+        return commands[-1]
+
+    times = [0.25, 0.5, 1.0]
+    found = simulate(driven(integrator=integrator, signals=signals), np.array(times))
+    assert found.points[:, 0, 0, 0] == pytest.approx(followed(law, times, "0.1"), abs=1e-11)
+    assert "a" not in found.model["signals"]
+    with pytest.raises(
+        InputError, match=r"loads.push.scale: acceleration\(mass, x\) depends on the forces of the same"
+    ):
+        driven(signals={"u": "3 - 0.4*acceleration(mass, x)"})
+
+
+def test_an_acceleration_is_that_of_the_place() -> None:
+    """The tip of a rod that is let go falls with 3/2 g."""
+    data = pendulum("1e-12*u", u={"sample": "acceleration(tip, y)", "period": 1})
+    data["initial"] = {"arm": {"angle": 0.0}}
+    found = simulate(Scene.parse(data), np.array([0.1]))
+    assert found.model["signals"]["u"][0] == pytest.approx(-1.5 * 9.81, abs=1e-9)
+    with pytest.raises(InputError, match="only samples know it"):
+        linearize(Scene.parse(pendulum()), ["motor"], ["acceleration(tip, x)"], about="start")
+
+
 def test_clocks_of_different_periods_meet_without_an_error() -> None:
     """A slow one sets what a fast one follows: 30 samples in 0.3 s, as no sum of floating numbers has them."""
     signals = {

@@ -287,6 +287,7 @@ def _begin(
     kernels.settle(tile, m, w, 0.0, tolerance, ASSEMBLY)
     if m.table.signals != 0:
         if due != 0:
+            kernels.acceleration(tile, m, w, 0.0, w.z, w.zdot, tolerance, w.a)
             signals.follow(tile, m, w, 0.0, w.z, w.zdot, w.z, signals.SAMPLE + signals.PARTS * due)
         signals.follow(tile, m, w, 0.0, w.z, w.zdot, w.z, signals.SETTLE)
     for i in range(end):

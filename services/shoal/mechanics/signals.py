@@ -41,11 +41,11 @@ class Signals(NamedTuple):
     """Measures, tape and loads of one tile.
 
     always: how many measures, positions, velocities, functions and instructions are evaluated at all times; what
-    follows them is for samples. measures: without any law. positions, velocities: rows of the state, and how many.
-    functions: of time, by number. constant: (constants, lanes). code: of the tape, `size` instructions, whose results
-    are the registers from `first` on. strength: registers that loads follow, and how many; switch: instructions that
-    switch; output: registers that are recorded. applied, torques: loads, in whose lists of functions registers stand;
-    torques of the plane act along their measure, times the amplitude of its law.
+    follows them is for samples. measures: without any law. positions, velocities, accelerations: rows of the state, and
+    how many. functions: of time, by number. constant: (constants, lanes). code: of the tape, `size` instructions, whose
+    results are the registers from `first` on. strength: registers that loads follow, and how many; switch: instructions
+    that switch; output: registers that are recorded. applied, torques: loads, in whose lists of functions registers
+    stand; torques of the plane act along their measure, times the amplitude of its law.
     """
 
     measures: Forces
@@ -55,6 +55,8 @@ class Signals(NamedTuple):
     velocities: int
     function: Index
     functions: int
+    acceleration: Index
+    accelerations: int
     constant: Array
     constants: int
     code: Index
@@ -205,7 +207,7 @@ def _enter(
         number = functions.evaluate(m.functions, s.function[k], t, 0)
         for lane in range(width):
             register[(at + k) * width + lane] = number
-    at += s.functions + s.samples.held
+    at += s.functions + s.accelerations + s.samples.held
     for k in range(s.constants):
         copy(tile, register, at + k, s.constant, k)
 
@@ -217,6 +219,11 @@ def _sample(tile: Tile, s: Signals, m: Any, w: Any, t: float, z: Array, zdot: Ar
     derive(tile, m.derived, zdot, m.unknowns, m.force_rows, True)
     _enter(tile, s, m, w, t, z, zdot, (s.measures.size, s.positions, s.velocities, s.functions))
     register, branch = _registers(tile, s, w.signals), _branches(tile, s, w.signals)
+    if s.accelerations > 0:
+        derive(tile, m.derived, w.a, m.unknowns, m.force_rows, True)
+        first = s.first - s.constants - s.samples.held - s.accelerations
+        for k in range(s.accelerations):
+            copy(tile, register, first + k, w.a, s.acceleration[k])
     tape.run(tile, s.code, s.always[4], s.first, register, branch, due == 0 and _held(tile, s, w.signals))
     room = shift(w.signals, (_before(s) - s.samples.pending) * len(tile))
     samples.take(tile, s.samples, s.code, s.always[4], s.first, register, room, due, t)

@@ -58,7 +58,7 @@ _LONGEST = 500
 _DEEPEST = 100
 
 
-AT_ONCE = ("acceleration", "force", "energy")
+AT_ONCE = ("force", "energy")
 """Measures that no formula knows."""
 NONE: Mapping[str, int] = MappingProxyType({})
 

@@ -24,7 +24,7 @@ Node = Any
 
 MEASURES = {
     **dict.fromkeys(("angle", "rate", "slide", "slide_rate"), 1),
-    **dict.fromkeys(("distance", "distance_rate", "position", "velocity"), 2),
+    **dict.fromkeys(("distance", "distance_rate", "position", "velocity", "acceleration"), 2),
 }
 """Measures of the machine that a formula may call, with the number of names that they take."""
 

@@ -83,6 +83,7 @@ def check_signals(scene: Any) -> None:
             raise ValueError(f"states.{name}: there is a signal of this name; use another one")
     for where, function in signal_functions(scene):
         check_leaves(scene, where, function)
+    _check_instants(scene)
     size, depth = dict[str, int](), dict[str, int]()
     for name in _order(scene.signals):
         function = formula_of(scene.signals[name])
@@ -117,6 +118,27 @@ def check_coupling(scene: Any, name: str, joint: Coupling) -> None:
                     f"joints.{name}.value: in space a sum with an angle (terms.{number}) is that of the start; leave "
                     "it out, and drive an angle by a driven-angle"
                 )
+
+
+def _check_instants(scene: Any) -> None:
+    """Raises ValueError where an acceleration would decide on the forces that it depends on."""
+    if not any(_accelerations(one) for _, one in signal_functions(scene)):
+        return
+    known = expanded(scene)
+    for where, one in signal_functions(scene):
+        sampled = where.endswith((".sample", ".next"))
+        if not where.startswith("signals.") and not sampled and (found := _accelerations(one, known)):
+            raise ValueError(
+                f"{where}: {found[0]} depends on the forces of the same instant; a sampled signal may follow it "
+                "(`sample`, `period`)"
+            )
+
+
+def _accelerations(function: SignalFunction, known: Mapping[str, Node] | None = None) -> list[Measure]:
+    """Return the accelerations in a function; known: what stands in it for names."""
+    tree = _tree(function)
+    parts = leaves(tree if known is None else _put(tree, known))
+    return [one for one in parts if isinstance(one, Measure) and one.kind == "acceleration"]
 
 
 def check_leaves(scene: Any, where: str, function: SignalFunction) -> None:
@@ -248,7 +270,7 @@ def joint_of(scene: Any, measure: Measure) -> Any:
 
 def _check_measure(scene: Any, where: str, measure: Measure) -> None:
     try:
-        if measure.kind in ("position", "velocity"):
+        if measure.kind in ("position", "velocity", "acceleration"):
             name, axis = measure.names
             at = place(scene, name)
             if axis not in _AXES[: scene.dimensions]:

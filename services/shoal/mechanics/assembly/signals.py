@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from shoal.errors import InputError
 from shoal.mechanics import tape
 from shoal.mechanics.affine import Affine
 from shoal.mechanics.applied import Applied
@@ -49,6 +50,11 @@ _RATES = {"rate": "angle", "slide_rate": "slide", "distance_rate": "distance"}
 _NO_LAW = ElementForceLaw()
 
 
+def _is_of_forces(node: Node) -> bool:
+    """Return whether a tree depends on an acceleration."""
+    return any(isinstance(leaf, Measure) and leaf.kind == "acceleration" for leaf in leaves(node))
+
+
 class SignalLoads:
     """Collects what loads follow, and the loads that do.
 
@@ -64,7 +70,7 @@ class SignalLoads:
         self.outputs: dict[str, Operand] = {}
         """What is recorded: loads by their fields, states and signals by their names."""
         self._measured: dict[tuple[str, tuple[str, ...]], int] = {}
-        self._rows: dict[str, list[int]] = {"position": [], "velocity": []}
+        self._rows: dict[str, list[int]] = {"position": [], "velocity": [], "acceleration": []}
         self._functions: list[int] = []
         self._constants: list[Number] = []
         self.names: list[str] = []
@@ -98,7 +104,11 @@ class SignalLoads:
         return (Formula(node), None) if is_of_time(node) else (None, node)
 
     def strength(self, field: str, node: Node) -> int:
-        """Return the number of a strength that loads follow."""
+        """Return the number of a strength that loads follow. Raises InputError for accelerations."""
+        if _is_of_forces(node):
+            raise InputError(
+                f"{field}: an acceleration depends on the forces of the same instant; only samples know it"
+            )
         found = self._operand(field, node)
         if found not in self._strengths:
             self._strengths.append(found)
@@ -138,7 +148,10 @@ class SignalLoads:
         self._known |= continuous
         stated: dict[str, Any] = self.scene.signals
         for name, each in stated.items():
-            if isinstance(each, SignalFunction) and each.number is None and self._expanded[name] in self._known:
+            if not isinstance(each, SignalFunction) or each.number is not None:
+                continue
+            # Accelerations are those of steps, and are not known between them.
+            if self._expanded[name] in self._known and not _is_of_forces(self._expanded[name]):
                 self.outputs[name] = self._known[self._expanded[name]]
 
     @property
@@ -166,8 +179,10 @@ class SignalLoads:
             return ()
         sizes = {
             "measure": 2 * len(self.measures.kinds),
-            **{kind: len(rows) for kind, rows in self._rows.items()},
+            "position": len(self._rows["position"]),
+            "velocity": len(self._rows["velocity"]),
             "function": len(self._functions),
+            "acceleration": len(self._rows["acceleration"]),
             "held": len(self._held),
             "constant": len(self._constants),
         }
@@ -188,6 +203,8 @@ class SignalLoads:
             len(velocity),
             index(self._functions),
             len(self._functions),
+            index(self._rows["acceleration"]),
+            len(self._rows["acceleration"]),
             stacked(self._constants),
             len(self._constants),
             index([one + [0] * (tape.ENTRIES - len(one)) for one in code]).ravel(),
