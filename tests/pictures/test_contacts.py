@@ -95,7 +95,9 @@ def test_the_page_and_the_terminal_say_what_happened() -> None:
     page = simulation(run, scene)
     assert said in page
     shown = json.loads(re.search(r"<script type=.application/json.[^>]*>(.*?)</script>", page, re.DOTALL)[1])  # type: ignore[index]
-    assert {*shown["stops"]} == {"shoulder", "elbow"}
+    symbols = shown["drawing"]["symbols"]
+    assert {one["part"] for one in symbols if one["look"] == "stop"} == {"shoulder", "elbow"}
+    assert {"rope"} == {one["part"] for one in symbols if one["look"] == "rope"}
     assert any(shown["slack"]["rope"])
     assert not all(shown["slack"]["rope"])
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from io import BytesIO
 from typing import Any
 
@@ -11,8 +13,9 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from PIL import Image
 
+from shoal.pictures.machine.strokes import is_fine, move, put, strokes
 from shoal.pictures.motion import DrawnMotion
-from shoal.pictures.style import BLACK, BLUE, GREY, ORANGE, VERMILION, canvas, headline, styled
+from shoal.pictures.style import BLACK, BLUE, BROWN, GREEN, GREY, ORANGE, SKY, VERMILION, canvas, headline, styled
 from shoal.pictures.views import views
 
 _FRAMES = 60
@@ -35,9 +38,10 @@ def gif(found: DrawnMotion, title: str) -> bytes:
     for k in np.linspace(0, len(found.times) - 1, _FRAMES).round().astype(int):
         # What stands still is drawn once.
         drawing.restore_region(still)
-        for line, path in moving:
-            line.set_data(*np.atleast_2d(path[k]).T)
-            figure.draw_artist(line)
+        for artists, shown_at in moving:
+            shown_at(int(k))
+            for artist in artists:
+                figure.draw_artist(artist)
         clock.set_text(f"t = {found.times[k]:.3f} s")
         figure.draw_artist(clock)
         images.append(Image.fromarray(np.asarray(drawing.buffer_rgba())).convert("RGB"))
@@ -51,36 +55,48 @@ def gif(found: DrawnMotion, title: str) -> bytes:
 def _palette() -> Image.Image:
     """The colours that are drawn with and their way to white: one palette for all frames, so that nothing flickers."""
     shares = np.linspace(0.0, 1.0, _SHADES)
-    colours = [np.array(to_rgb(name)) for name in (BLACK, GREY, BLUE, ORANGE, VERMILION)]
+    colours = [np.array(to_rgb(name)) for name in (BLACK, GREY, BLUE, ORANGE, VERMILION, GREEN, SKY, BROWN)]
     table = [255 * (share * colour + 1.0 - share) for colour in colours for share in shares]
     found = Image.new("P", (1, 1))
     found.putpalette(np.round(table).astype(np.uint8).tobytes())
     return found
 
 
-def _stage(found: DrawnMotion, title: str) -> tuple[Figure, list[tuple[Any, Any]], Any]:
-    """The figure without what moves, the lines that do with their data by frame, and the clock."""
+Shown = tuple[list[Any], Callable[[int], None]]
+"""Artists, and what lets them show a frame."""
+
+
+def _stage(found: DrawnMotion, title: str) -> tuple[Figure, list[Shown], Any]:
+    """The figure without what moves, what moves in the order in which it is drawn, and the clock."""
     figure, axes = canvas(1.4 + 5.6 * found.aspect)
     low, high = found.box
     size = float(np.max(high - low)) or 1.0
-    shown: list[tuple[Any, Any]] = []
+    shown: list[Shown] = []
 
     def line(path: Any, style: str, label: str, **look: Any) -> None:
         (drawn,) = axes.plot([], [], style, label=label, **look)
-        shown.append((drawn, path))
+        shown.append(([drawn], lambda k: drawn.set_data(*np.atleast_2d(path[k]).T)))
 
-    axes.plot(*found.ground.T, "s", color=GREY, markersize=8)
+    fine = is_fine(found)
+    drawn = found.drawing.parts() if fine else set()
+    if not fine:
+        axes.plot(*found.ground.T, "s", color=GREY, markersize=8)
     for thin in found.thin.values():
         line(thin, "-", "", color=GREY, linewidth=0.8)
     for name, ends in found.links.items():
+        if name in drawn:
+            continue
         loose = found.slack.get(name, np.zeros(len(ends), dtype=bool))[:, None, None]
         line(np.where(loose, np.nan, ends), "-", "", color=GREY, linewidth=0.8)
         if np.any(loose):
             line(np.where(loose, ends, np.nan), "--", "", color=GREY, linewidth=0.8)
-    for stop in found.stops.values():
-        line(stop, "-", "", color=BLACK, linewidth=1.0)
-    for outline in found.outlines.values():
-        line(outline, "o-", "", color=BLUE, linewidth=3, markersize=4, markevery=[0, -1])
+    for name, outline in found.outlines.items():
+        if name not in found.shaped:
+            line(outline, "o-", "", color=BLUE, linewidth=3, markersize=4, markevery=[0, -1])
+    for stroke in strokes(found):
+        artists = put(axes, stroke, 0)
+        if not stroke.still:
+            shown.append((artists, partial(move, artists, stroke)))
     for number, path in enumerate(found.markers.values()):
         axes.plot(*path.T, "-", color=VERMILION, linewidth=0.8, alpha=0.4)
         line(path, "o", "" if number else "marker", color=VERMILION, markersize=6)
@@ -100,6 +116,6 @@ def _stage(found: DrawnMotion, title: str) -> tuple[Figure, list[tuple[Any, Any]
         axes.set_axis_off()
     figure.legend(*axes.get_legend_handles_labels(), loc="outside lower left", ncols=3)
     clock = axes.text(0.99, 0.99, "", transform=axes.transAxes, ha="right", va="top", family="monospace")
-    for artist in (*(drawn for drawn, _ in shown), clock):
+    for artist in (*(artist for artists, _ in shown for artist in artists), clock):
         artist.set_animated(True)  # left out of the still picture
     return figure, shown, clock

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,12 +12,14 @@ import numpy as np
 from shoal.engines.contract import Engine
 from shoal.errors import ComputationError, InputError
 from shoal.json_values import plain
-from shoal.pictures.contacts import Limits, slack, struck
+from shoal.pictures.contacts import slack, struck
 from shoal.pictures.links import At, Links
+from shoal.pictures.machine.drawing import Drawing
+from shoal.pictures.machine.sketch import Sketch
 from shoal.pictures.outline import ground, outlined
 from shoal.pictures.solids import Bar, MarkedScene
 from shoal.pictures.views import ViewDirection, views
-from shoal.scene import Scene
+from shoal.scene import Rod, Scene
 from shoal.trajectory import Array
 
 if TYPE_CHECKING:
@@ -34,7 +37,8 @@ class DrawnMotion:
     measured: places [m], (frames, d), nan where none was measured near that time; directions: measured angles [rad]
     behind: outlines of another machine that is drawn below [m], (frames, points, d)
     links: places that a spring or a distance joins [m], (frames, 2, d); slack: when ropes and struts hold nothing,
-    (frames,); stops: lines of limits and surfaces in the plane [m], (frames, points, 2), nan between them
+    (frames,); drawing: symbols of bodies, joints and loads; half: of the thickness of rods that bend in the plane, at
+    the points of their outlines [m], (points,)
     events: of contacts, as `model["events"]` has them; struck: times of impacts, by marker [s]
     In space: bars of bodies; axes of joints: a point [m] and a direction, (frames, 2, 3); up: the direction against
     gravity, along an axis, (3,).
@@ -51,7 +55,8 @@ class DrawnMotion:
     behind: dict[str, Array] = field(default_factory=dict)
     links: dict[str, Array] = field(default_factory=dict)
     slack: dict[str, Array] = field(default_factory=dict)
-    stops: dict[str, Array] = field(default_factory=dict)
+    drawing: Drawing = field(default_factory=Drawing)
+    half: dict[str, Array] = field(default_factory=dict)
     events: Sequence[Mapping[str, Any]] = ()
     struck: dict[str, Array] = field(default_factory=dict)
     bars: dict[str, Bar] = field(default_factory=dict)
@@ -66,12 +71,26 @@ class DrawnMotion:
         return float(self.times[-1] - self.times[0])
 
     @property
+    def stops(self) -> dict[str, Array]:
+        """Lines of limits and surfaces in the plane [m], (frames, points, 2), nan between them."""
+        shown = [symbol for symbol in self.drawing.symbols if symbol.look in ("stop", "surface")]
+        frames = len(self.times)
+        return {one.part: np.broadcast_to(path := self.drawing.path(one), (frames, *path.shape[1:])) for one in shown}
+
+    @property
+    def shaped(self) -> set[str]:
+        """The bodies that are drawn by their shape, and not by the line of their outline."""
+        points = {name for name, outline in self.outlines.items() if outline.shape[1] == 1 and self.drawing.symbols}
+        return self.drawing.parts("body", "plate") | self.half.keys() | points
+
+    @cached_property
     def box(self) -> tuple[Array, Array]:
         """Lower left and upper right corner [m] of all that is shown, (2,) each."""
-        parts = (self.outlines, self.behind, self.measured, self.links, self.stops, self.thin)
+        parts = (self.outlines, self.behind, self.measured, self.links, self.thin)
         moving = (path for part in parts for path in part.values())
         solid = (bar.edges for bar in self.bars.values())
-        every = np.concatenate([np.reshape(x, (-1, self.ground.shape[1])) for x in (*moving, *solid, self.ground)])
+        shown = (*moving, *solid, *self.drawing.places, self.ground)
+        every = np.concatenate([np.reshape(x, (-1, self.ground.shape[1])) for x in shown])
         return np.nanmin(every, axis=0), np.nanmax(every, axis=0)
 
     @property
@@ -107,6 +126,7 @@ class DrawnMotion:
             behind=flat(self.behind),
             links=flat(self.links),
             thin=flat(thin),
+            drawing=self.drawing.projected(view.plane),
             labels=view.labels,
             bars={},
             axes={},
@@ -137,19 +157,26 @@ def traced_out(scene: Scene) -> tuple[Scene, Callable[[At, Array], dict[str, Any
     These are the paths of a marker by its name [m], (frames, d), and the times of the motion [s], (frames,).
     """
     traced, points = outlined(scene)
-    links, stops = Links(scene), Limits(scene)
+    links, sketch = Links(scene), Sketch(scene)
     solids = MarkedScene(traced, points, scene) if scene.dimensions == 3 else None
     data = (traced if solids is None else solids.scene).model_dump(mode="json")
-    data["markers"] |= links.markers | stops.markers
+    data["markers"] |= links.markers | sketch.markers
+    rods = scene.flexible_rods if scene.dimensions == 2 else {}
+    half = {name: _half(rod, len(points[name])) for name, rod in rods.items()}
 
     def read(at: At, times: Array) -> dict[str, Any]:
         outlines = {body: np.stack([at(name) for name in names], axis=1) for body, names in points.items()}
         joined = links.shown(at, times)
-        limits = {"slack": slack(scene, joined), "stops": stops.shown(at, len(times))}
-        shown = {"outlines": outlines, "links": joined, **limits}
+        drawing = sketch.drawing(at, times, outlines.values(), joined.values())
+        shown = {"outlines": outlines, "links": joined, "slack": slack(scene, joined), "drawing": drawing, "half": half}
         return shown if solids is None else {**shown, "up": upwards(scene), **solids.shown(at, len(times))}
 
     return Scene.parse(data, scene.name), read
+
+
+def _half(rod: Rod, count: int) -> Array:
+    """Return half the thickness of a rod at points along it [m], (points,)."""
+    return np.asarray(rod.section_at(np.linspace(0.0, 1.0, count)).height / 2 * np.ones(count))
 
 
 def upwards(scene: Scene) -> Array:
@@ -206,16 +233,18 @@ def plain_motion(found: DrawnMotion) -> dict[str, Any]:
     (low, high), size = found.box, found.size
     digits = max(0, 4 - int(np.floor(np.log10(size)))) if size > 0 else 6
     space = {} if found.up is None else _plain_space(found, digits)
+    drawn = found.shaped - found.half.keys() if found.up is None else ()
     return {
         "name": found.name,
         "times": np.round(found.times, 6).tolist(),
         "box": [*low.tolist(), *high.tolist()],
         "ground": plain(found.ground),
         "behind": {name: plain(np.round(x, digits)) for name, x in found.behind.items()},
-        "outlines": {name: plain(np.round(x, digits)) for name, x in found.outlines.items()},
+        "outlines": {name: plain(np.round(x, digits)) for name, x in found.outlines.items() if name not in drawn},
         "links": {name: plain(np.round(x, digits)) for name, x in found.links.items()},
         "slack": {name: x.tolist() for name, x in found.slack.items()},
-        "stops": {name: plain(np.round(x, digits)) for name, x in found.stops.items()},
+        "drawing": found.drawing.to_json(digits),
+        "half": {name: plain(np.round(x, digits + 1)) for name, x in found.half.items()},
         "markers": {name: plain(np.round(x, digits)) for name, x in found.markers.items()},
         "measured": {name: plain(np.round(x, digits)) for name, x in found.measured.items()},
         "directions": {name: plain(np.round(x, 4)) for name, x in found.directions.items()},
@@ -231,6 +260,7 @@ def _plain_space(found: DrawnMotion, digits: int) -> dict[str, Any]:
             "side": None if bar.side is None else plain(np.round(bar.side, 4)),
             "size": plain(bar.size),
             "clear": bar.stands_for,
+            "round": bar.round or bar.side is None,
         }
         for name, bar in found.bars.items()
     }

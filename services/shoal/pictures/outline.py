@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from shoal.scene import GROUND, Attachment, RigidBody, Rod, Scene
+from shoal.scene.loads import Spring
 from shoal.trajectory import Array
 
 _ALONG = 33
@@ -19,10 +20,9 @@ def outlined(scene: Scene) -> tuple[Scene, dict[str, list[str]]]:
     """The scene with markers along its bodies, and their names by body."""
     data = scene.model_dump(mode="json")
     names: dict[str, list[str]] = {}
-    used = [*_sides(scene), *scene.markers.values()]
     for name, body in scene.bodies.items():
         # A body that is no rod is drawn as the line through the places that it is joined and observed at.
-        places = _along(body) if isinstance(body, Rod) else _joined(scene, name, used)
+        places = _along(body) if isinstance(body, Rod) else joined_places(scene, name)
         if scene.dimensions == 3 and isinstance(body, RigidBody):
             # Of the lines in space each goes through the centre of mass, where its cuboid is.
             places = [place for joined in places for place in (list(body.centre_of_mass), joined)]
@@ -42,7 +42,10 @@ def _sides(scene: Scene) -> list[Attachment]:
     return [side for side in sides if isinstance(side, Attachment)]
 
 
-def _joined(scene: Scene, body: str, used: list[Attachment]) -> list[Any]:
+def joined_places(scene: Scene, body: str) -> list[Any]:
+    """Return the places in its frame that a body is joined, sprung and observed at [m], else its origin."""
+    springs = (load for load in scene.loads.values() if isinstance(load, Spring))
+    used = [*_sides(scene), *scene.markers.values(), *(side for load in springs for side in (load.first, load.second))]
     places = [scene.location(at) for at in used if at.body == body]
     return [list(place) for place in dict.fromkeys(places or [(0.0, 0.0)])]
 

@@ -27,11 +27,12 @@ _SHOWN = 5.0
 _FEW = 4
 """So many names are listed."""
 _SPACE = (
-    "grey squares stand on the ground, chain lines are axes of joints, clear boxes have the mass and inertia of a "
+    "hatched is the ground, chain lines are axes of joints, clear boxes and cylinders have the mass and inertia of a "
     "body. Rods are drawn with their section, at least a few dots thick, and shadows fall on a floor below. Drag to "
     "turn, with Shift to move; wheel or pinch to zoom. On the picture the arrow keys turn, + and − zoom, Home goes "
     "back, the space bar plays."
 )
+_LOADED = " Green arrows are drives and loads, each as long as it is large over time."
 
 
 def environment(*more: BaseLoader) -> Environment:
@@ -57,9 +58,10 @@ def animation(found: DrawnMotion, what: str) -> dict[str, Any]:
     over = " over " + " and ".join(shown[1:]) if shown[1:] else ""
     # "</" would end the script element.
     data = json.dumps(plain_motion(found), allow_nan=False).replace("</", "<\\/")
-    caption = f"{shown[0]}{over}; grey squares stand on the ground. The arrow keys move the slider."
+    loaded = _LOADED if found.drawing.parts("load", "drive") else ""
+    caption = f"{shown[0]}{over}; hatched is the ground.{loaded} The arrow keys move the slider."
     if found.up is not None:
-        caption = f"{shown[0]}{over}; {_SPACE}"
+        caption = f"{shown[0]}{over}; {_SPACE}{loaded}"
     return {
         "name": found.name,
         "aspect": round(found.aspect, 3),

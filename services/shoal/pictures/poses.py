@@ -8,13 +8,18 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
 from shoal.pictures.contacts import mark_impacts
+from shoal.pictures.machine.strokes import is_fine, put, strokes
 from shoal.pictures.motion import DrawnMotion
-from shoal.pictures.style import BLACK, BLUE, GREY, ORANGE, VERMILION, canvas, headline, styled
+from shoal.pictures.style import BLACK, BLUE, GREY, LOOKS, ORANGE, VERMILION, canvas, headline, styled
 from shoal.pictures.views import views
 
 _POSES = 7
 _FEW = 10
 """So many places on the ground have large marks."""
+_BEFORE = 0.6
+"""Strength of a machine before its last pose, in which its symbols are drawn."""
+_EARLIER = [LOOKS[name] for name in ("block", "mass", "surface")]
+"""Looks that are drawn of earlier poses too."""
 _HALO = [withStroke(linewidth=3, foreground="white")]
 
 
@@ -59,19 +64,27 @@ def _frame(axes: Axes, seen: DrawnMotion, half: float, name: str) -> None:
 def _draw(axes: Axes, found: DrawnMotion, way: str) -> None:
     count = min(_POSES, len(found.times))
     chosen = np.linspace(0, len(found.times) - 1, count).round().astype(int)
+    machine, fine = strokes(found), is_fine(found)
+    drawn = found.drawing.parts() if fine else set()
     for number, k in enumerate(chosen):
-        strength = min(1.0, 0.2 + 0.8 * number / max(count - 1, 1))
-        for line in found.thin.values():
+        strength, last = min(1.0, 0.2 + 0.8 * number / max(count - 1, 1)), k == chosen[-1]
+        for line in found.thin.values() if last else ():
             axes.plot(*line[k].T, color=GREY, alpha=strength, linewidth=0.7)
         for name, line in found.links.items():
             style = "--" if name in found.slack and found.slack[name][k] else "-"
-            axes.plot(*line[k].T, style, color=GREY, alpha=strength, linewidth=0.7)
-        for stop in found.stops.values():
-            axes.plot(*stop[k].T, color=BLACK, alpha=strength, linewidth=1.0)
-        for outline in found.outlines.values():
-            axes.plot(*outline[k].T, "o-", markersize=2.5, markevery=[0, -1], color=BLUE, alpha=strength, linewidth=2.2)
+            if name not in drawn:
+                axes.plot(*line[k].T, style, color=GREY, alpha=strength, linewidth=0.7)
+        for name, outline in found.outlines.items():
+            if not (last and name in found.shaped):
+                axes.plot(*outline[k].T, color=BLUE, alpha=_BEFORE * strength, linewidth=1.6, solid_capstyle="round")
+        for stroke in machine:
+            if last or (stroke.look in _EARLIER and not stroke.still):
+                put(axes, stroke, k, 1.0 if last else _BEFORE * strength)
     size = 7 if len(found.ground) <= _FEW else 3
-    axes.plot(*found.ground.T, "s", color=GREY, markersize=size, label="ground" if len(found.ground) else "", zorder=3)
+    if not fine:
+        axes.plot(
+            *found.ground.T, "s", color=GREY, markersize=size, label="ground" if len(found.ground) else "", zorder=3
+        )
     for number, place in enumerate(found.measured.values()):
         axes.plot(*place.T, "o", color=BLACK, markersize=4, fillstyle="none", label="" if number else "measured")
     for number, path in enumerate(found.markers.values()):

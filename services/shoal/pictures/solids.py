@@ -16,21 +16,26 @@ from shoal.trajectory import Array
 
 _LEAST = 1e-9
 """A cuboid thinner than this share of its length is none."""
+_ALIKE = 1e-6
+"""Moments of inertia that differ by less are those of a cylinder."""
+_ROUND = ("round", "tube")
 
 
 @dataclass(frozen=True)
 class Bar:
-    """A bar of rectangular section, or of round section where its rotation about its axis is unknown.
+    """A bar of rectangular or round section; of round one where its rotation about its axis is unknown.
 
     axis: points along it [m], (frames, points, 3); side: unit vector along the height of its section, (frames, 1, 3),
     or one for each point; size: height and width at each point [m], (points, 2)
-    stands_for: whether it is a rigid body's cuboid, which has its mass and inertia, not its shape
+    stands_for: whether it is a rigid body's cuboid or cylinder, which has its mass and inertia, not its shape
+    round: whether its section is round, of the height and width as diameters
     """
 
     axis: Array
     side: Array | None
     size: Array
     stands_for: bool = False
+    round: bool = False
 
     @property
     def edges(self) -> Array:
@@ -39,12 +44,15 @@ class Bar:
             return self.axis
         chord = self.axis[:, -1:] - self.axis[:, :1]
         third = np.cross(chord / np.linalg.norm(chord, axis=2, keepdims=True), self.side)
-        signs = np.array([(1, 1), (1, -1), (-1, -1), (-1, 1)]) / 2
+        angle = 2 * np.pi * np.arange(12) / 12
+        turns = np.stack([np.cos(angle), np.sin(angle)], axis=1) / 2
+        ring = turns if self.round else np.array([(1, 1), (1, -1), (-1, -1), (-1, 1)]) / 2
         height, width = self.size.T[:, None, :, None]
-        corners = [self.axis + a * height * self.side + b * width * third for a, b in signs]
+        corners = [self.axis + a * height * self.side + b * width * third for a, b in ring]
         gap = np.full_like(corners[0][:, :1], np.nan)
         rings = [np.stack([corner[:, k] for corner in (*corners, corners[0])], axis=1) for k in (0, -1)]
-        return np.concatenate([part for line in (*corners, *rings) for part in (line, gap)], axis=1)
+        along = corners[::3] if self.round else corners
+        return np.concatenate([part for line in (*along, *rings) for part in (line, gap)], axis=1)
 
 
 class MarkedScene:
@@ -87,12 +95,15 @@ class MarkedScene:
             section = body.section_at(np.linspace(0.0, 1.0, len(names)))
             size = np.column_stack([side * np.ones(len(names)) for side in (section.height, section.width)])
             across = None if body.element != "rigid" else self._add(name, (0.0, body.length, 0.0))
-            return lambda at: _bar(at, names, across, size, body.length)
+            is_round = body.section in _ROUND
+            return lambda at: _bar(at, names, across, size, body.length, is_round=is_round)
         if not isinstance(body, RigidBody):
             return None
         moments, axes = np.linalg.eigh(body.inertia_matrix)
         # Of a cuboid with sides a, b, c: I_a = m (b^2 + c^2) / 12. The smallest moment is about its longest side.
         sides = np.sqrt(np.maximum(0.0, 6.0 / body.mass * (moments.sum() - 2.0 * moments)))
+        if (found := _cylinder(moments, axes, body.mass)) is not None:
+            sides, axes = found
         if sides[0] <= 0 or sides[1] <= _LEAST * sides[0]:
             return None
         middle = np.array([*body.centre_of_mass, 0.0][:3])
@@ -100,7 +111,8 @@ class MarkedScene:
         ends = [self._add(name, middle - half), self._add(name, middle + half)]
         side = self._add(name, middle - half + sides[0] * axes[:, 1])
         size = np.tile(sides[1:], (2, 1))
-        return lambda at: _bar(at, ends, side, size, float(sides[0]), stands_for=True)
+        is_round = found is not None
+        return lambda at: _bar(at, ends, side, size, float(sides[0]), stands_for=True, is_round=is_round)
 
     def _place(self, side: Attachment) -> Callable[[At], Array] | None:
         """Return the position of an attachment; None for a moving point of the ground."""
@@ -162,8 +174,27 @@ class MarkedScene:
         return np.stack([x, y, np.cross(x, y)], axis=2)
 
 
-def _bar(at: At, along: list[str], across: str | None, size: Array, away: float, stands_for: bool = False) -> Bar:
+def _cylinder(moments: Array, axes: Array, mass: float) -> tuple[Array, Array] | None:
+    """Return length and diameters of the cylinder with some moments of inertia, and its axes; None if two differ.
+
+    About its axis m r^2 / 2, across it m (3 r^2 + h^2) / 12.
+    """
+    low, middle, high = moments
+    flat, long = (np.isclose(middle, one, rtol=_ALIKE) for one in (low, high))
+    if flat == long:
+        return None
+    k = 2 if flat else 0
+    radius = np.sqrt(2.0 * moments[k] / mass)
+    height = np.sqrt(max(0.0, 12.0 * middle / mass - 3.0 * radius**2))
+    order = [k, *(n for n in range(3) if n != k)]
+    return np.array([height, 2 * radius, 2 * radius]), axes[:, order]
+
+
+def _bar(
+    at: At, along: list[str], across: str | None, size: Array, away: float, *, stands_for: bool = False,
+    is_round: bool = False,
+) -> Bar:  # fmt: skip
     """From the markers along it, and one that is away [m] across it from the first."""
     axis = np.stack([at(name) for name in along], axis=1)
     side = None if across is None else ((at(across) - axis[:, 0]) / away)[:, None]
-    return Bar(axis, side, size, stands_for)
+    return Bar(axis, side, size, stands_for, is_round)

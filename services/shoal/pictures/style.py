@@ -57,6 +57,39 @@ LINES: tuple[dict[str, Any], ...] = (
 )
 """Looks of lines that have no fixed meaning."""
 
+PALE, LIGHT, DARK, BROWN = "#B9DAF0", "#E4F1FA", "#4A4A4A", "#8A5A00"
+"""Insides of bodies and of what lies behind them; lines of springs and guides; ropes."""
+
+LOOKS: dict[str, dict[str, Any]] = {
+    "ring": {"layer": 0, "edge": BLUE, "width": 1.2, "fill": None},
+    "gear": {"layer": 0, "edge": BLUE, "width": 1.2, "fill": LIGHT},
+    "spoke": {"layer": 0.5, "edge": BLUE, "width": 1.0, "fill": None},
+    "ground": {"layer": 1, "edge": DARK, "width": 1.2, "fill": "#E6E6E6"},
+    "hatch": {"layer": 1, "edge": DARK, "width": 1.1, "fill": None},
+    "guide": {"layer": 1, "edge": DARK, "width": 1.3, "fill": None},
+    "foot": {"layer": 1, "edge": DARK, "width": 0.6, "fill": "#D0D0D0", "solid": True},
+    "wheel": {"layer": 2, "edge": BLUE, "width": 0.5, "fill": LIGHT, "solid": True},
+    "plate": {"layer": 2.2, "edge": BLUE, "width": 1.3, "fill": LIGHT},
+    "solid": {"layer": 5, "edge": BLUE, "width": 0.6, "fill": PALE, "solid": True},
+    "surface": {"layer": 2, "edge": BLACK, "width": 1.3, "fill": PALE},
+    "body": {"layer": 3, "edge": BLUE, "width": 1.6, "fill": PALE},
+    "block": {"layer": 2.5, "edge": BLUE, "width": 1.6, "fill": PALE},
+    "mass": {"layer": 3, "edge": BLUE, "width": 1.6, "fill": BLUE},
+    "ball": {"layer": 3, "edge": BLUE, "width": 0.5, "fill": BLUE, "solid": True},
+    "link": {"layer": 3, "edge": GREY, "width": 1.3, "fill": "#FFFFFF"},
+    "stop": {"layer": 4, "edge": BLACK, "width": 1.5, "fill": None},
+    "spring": {"layer": 4, "edge": DARK, "width": 1.5, "fill": None},
+    "rope": {"layer": 4, "edge": BROWN, "width": 1.6, "fill": None},
+    "weld": {"layer": 5, "edge": BLUE, "width": 1.2, "fill": BLUE},
+    "pin": {"layer": 5, "edge": BLUE, "width": 1.5, "fill": "#FFFFFF"},
+    "drive": {"layer": 5.5, "edge": GREEN, "width": 2.0, "fill": None},
+    "load": {"layer": 6, "edge": GREEN, "width": 1.0, "fill": GREEN},
+}
+"""Looks of symbols: the layer, the colour and width [pixels or 1/96 inch] of lines, and the colour inside, if any.
+Faces of solids are seen from outside alone.
+
+Okabe and Ito's colours: blue moves, dark grey stands or is elastic, green drives and loads."""
+
 _RC: Any = {
     "font.family": "DejaVu Sans",
     "font.size": 12.5,

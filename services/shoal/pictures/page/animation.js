@@ -46,15 +46,6 @@ function animate(figure) {
     context.setLineDash([]);
   }
 
-  function lines(points, to, colour, thickness) {
-    // Places that are null are between lines.
-    let part = [];
-    for (const p of [...points, [null, null]]) {
-      if (p[0] !== null) part.push(to(p));
-      else if (part.length) { line(part, colour, thickness); part = []; }
-    }
-  }
-
   function circle(p, radius, colour, filled) {
     context.beginPath();
     context.arc(p[0], p[1], radius, 0, 2 * Math.PI);
@@ -83,23 +74,71 @@ function animate(figure) {
     slider.setAttribute("aria-valuetext", clock.textContent);
   }
 
+  // The lines of a symbol in a frame: place + sum of coordinates times axes; see Carrier in Python.
+  function moved(symbol) {
+    const { kind, place, axes } = run.drawing.carriers[symbol.by], [x0, y0] = symbol.at;
+    const o = place[Math.min(frame, place.length - 1)], a = axes[Math.min(frame, axes.length - 1)];
+    const size = kind === "turned" ? 1 : 1 / (Math.hypot(a[0], a[1]) || 1);
+    const [c, d] = kind === "any" ? [a[2], a[3]] : [-size * a[1], size * a[0]];
+    return run.drawing.shapes[symbol.shape].map(([u, v]) => {
+      const x = x0 + u, y = y0 + v;
+      return u === null ? [null, null] : [o[0] + a[0] * x + c * y, o[1] + a[1] * x + d * y];
+    });
+  }
+
+  function shape(points, to, look) {
+    let part = [];
+    for (const p of [...points, [null, null]]) {
+      if (p[0] !== null) part.push(to(p));
+      else if (part.length) {
+        if (look.fill) {
+          context.beginPath();
+          part.forEach((q, k) => (k ? context.lineTo(...q) : context.moveTo(...q)));
+          context.closePath();
+          context.fillStyle = look.fill;
+          context.fill();
+        }
+        line(part, look.edge, look.width);
+        part = [];
+      }
+    }
+  }
+
+  // The outline of a rod that bends, with its thickness.
+  function strip(points, half) {
+    const normals = points.map((_, k) => {
+      const a = points[Math.max(k - 1, 0)], b = points[Math.min(k + 1, points.length - 1)];
+      const length = Math.hypot(b[0] - a[0], b[1] - a[1]) || 1;
+      return [-(b[1] - a[1]) / length * half[k], (b[0] - a[0]) / length * half[k]];
+    });
+    const side = (sign) => points.map((p, k) => [p[0] + sign * normals[k][0], p[1] + sign * normals[k][1]]);
+    const left = side(1);
+    return [...left, ...side(-1).reverse(), left[0]];
+  }
+
   function plane() {
-    const { size, to } = place();
+    const { size, to } = place(), { unit, fine, looks, symbols } = run.drawing, detailed = unit * size >= fine;
     context.lineCap = context.lineJoin = "round";
-    for (const p of run.ground.map(to)) {
+    for (const p of detailed ? [] : run.ground.map(to)) {
       context.fillStyle = GREY;
       context.fillRect(p[0] - 5, p[1] - 5, 10, 10);
     }
     for (const path of Object.values(run.markers)) line(path.slice(0, frame + 1).map(to), "#F0B48C", 1.5);
     for (const outline of Object.values(run.behind)) line(outline[frame].map(to), "#A0A0A0", 3);
+    const drawn = new Set(detailed ? symbols.map((symbol) => symbol.part) : []);
     for (const [name, ends] of Object.entries(run.links)) {
-      line(ends[frame].map(to), GREY, 1.5, run.slack[name]?.[frame] ? [5, 5] : []);
+      if (!drawn.has(name)) line(ends[frame].map(to), GREY, 1.5, run.slack[name]?.[frame] ? [5, 5] : []);
     }
-    for (const stop of Object.values(run.stops)) lines(stop[frame], to, BLACK, 1.5);
-    for (const outline of Object.values(run.outlines)) {
-      line(outline[frame].map(to), BLUE, 4);
-      for (const end of [outline[frame][0], outline[frame].at(-1)]) circle(to(end), 4, BLUE, true);
+    const things = symbols.filter((symbol) => detailed || run.drawing.always.includes(symbol.look))
+      .map((symbol) => ({ look: looks[symbol.look], draw: (look) => shape(moved(symbol), to, look) }));
+    for (const [name, outline] of Object.entries(run.outlines)) {
+      const half = run.half[name];
+      things.push({ look: looks.body, draw: (look) => {
+        if (half) shape(strip(outline[frame], half), to, look);
+        else line(outline[frame].map(to), BLUE, 4);
+      } });
     }
+    things.sort((a, b) => a.look.layer - b.look.layer).forEach(({ look, draw }) => draw(look));
     for (const [name, angles] of Object.entries(run.directions)) {
       const p = to(run.markers[name][frame]), a = angles[frame];
       if (a !== null) line([p, [p[0] + 34 * Math.cos(a), p[1] - 34 * Math.sin(a)]], ORANGE, 3);

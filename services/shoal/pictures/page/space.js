@@ -86,17 +86,18 @@ function spatial(run, figure, redraw) {
     });
   }
 
-  // A bar as faces between rings of corners; without `side` its section is round.
-  function bar(axis, side, size, clear) {
+  // A bar as faces between rings of corners; without `side` its rotation about its axis is unknown.
+  function bar(axis, side, size, clear, round) {
     const least = 3.5 / scale, count = axis.length, parts = count === 2 && !clear ? 8 : 1, rings = [];
+    const corners = clear || count === 2 ? 16 : 8;
     let across = side ? side[0] : Math.abs(dot(unit(add(axis[1], axis[0], -1)), up)) < 0.9 ? up : right;
     for (let k = 0; k < count; k += 1) {
       const along = unit(add(axis[Math.min(k + 1, count - 1)], axis[Math.max(k - 1, 0)], -1));
       if (side) across = side[Math.min(k, side.length - 1)];
       across = unit(add(across, along, -dot(across, along)));
       const third = cross(along, across), [height, width] = size[k].map((one) => Math.max(one, least) / 2);
-      const ways = side ? [[1, 1], [-1, 1], [-1, -1], [1, -1]]
-        : [...Array(8)].map((_, n) => [Math.cos(n * Math.PI / 4), Math.sin(n * Math.PI / 4)]);
+      const ways = round ? [...Array(corners)].map((_, n) => [Math.cos((2 * n + 1) * Math.PI / corners),
+        Math.sin((2 * n + 1) * Math.PI / corners)]) : [[1, 1], [-1, 1], [-1, -1], [1, -1]];
       rings.push(ways.map(([a, b]) => add(add(axis[k], across, a * height), third, b * width)));
     }
     const sides = rings[0].length;
@@ -153,7 +154,7 @@ function spatial(run, figure, redraw) {
   function machine(frame) {
     for (const [name, outline] of Object.entries(run.outlines)) {
       const body = run.bars[name], points = outline[frame];
-      if (body) bar((body.axis || run.outlines[name])[frame], body.side && body.side[frame], body.size, body.clear);
+      if (body) bar((body.axis || run.outlines[name])[frame], body.side && body.side[frame], body.size, body.clear, body.round);
       if (body && !body.clear) continue;
       for (let k = 0; k + 1 < points.length; k += 1) line([points[k], points[k + 1]], "#0072B2", 4);
       if (!body) sprite(points[0], (p) => dots(p, 7, "#0072B2"));
@@ -161,13 +162,55 @@ function spatial(run, figure, redraw) {
     for (const outline of Object.values(run.behind)) {
       for (let k = 0; k + 1 < outline[frame].length; k += 1) line(outline[frame].slice(k, k + 2), "#A0A0A0", 3);
     }
+    const drawn = symbols(frame);
     for (const [name, ends] of Object.entries(run.links)) {
-      line(ends[frame], "#767676", 1.5, run.slack[name]?.[frame] ? [5, 5] : []);
+      if (!drawn.has(name)) line(ends[frame], "#767676", 1.5, run.slack[name]?.[frame] ? [5, 5] : []);
     }
     for (const axis of Object.values(run.axes)) {
       const [place, way] = axis[frame];
       for (const half of [-1, 1]) line([place, add(place, way, 0.1 * half * extent)], "#B06A00", 1.6, [9, 3, 2, 3]);
     }
+  }
+
+  // The symbols of the drawing: place + sum of coordinates times axes, of which a flat symbol has two.
+  function symbols(frame) {
+    const { unit, fine, looks, shapes, carriers, symbols } = run.drawing;
+    if (unit * scale < fine) return new Set();
+    for (const symbol of symbols) {
+      const { place, axes } = carriers[symbol.by], look = looks[symbol.look];
+      const o = place[Math.min(frame, place.length - 1)], a = axes[Math.min(frame, axes.length - 1)];
+      const moved = (p) => p.reduce((sum, x, k) => add(sum, a.slice(3 * k, 3 * k + 3), x + symbol.at[k]), o);
+      let part = [];
+      for (const p of [...shapes[symbol.shape], [null]]) {
+        if (p[0] !== null) part.push(moved(p));
+        else {
+          if (look.fill) filled(part, look);
+          else for (let k = 0; k + 1 < part.length; k += 1) line([part[k], part[k + 1]], look.edge, look.width);
+          part = [];
+        }
+      }
+    }
+    return new Set(symbols.map((symbol) => symbol.part));
+  }
+
+  function filled(places, look) {
+    const points = places.map(to);
+    let turn = 0;
+    points.forEach((p, k) => { const q = points[(k + 1) % points.length]; turn += p[0] * q[1] - p[1] * q[0]; });
+    if (look.solid && turn >= 0) return;  // seen from behind
+    // What is turned away from the light is darker.
+    const normal = unit(cross(add(places[1], places[0], -1), add(places[2], places[1], -1)));
+    const bright = look.solid ? 0.72 + 0.28 * Math.max(0, dot(eye.map((axis) => dot(axis, normal)), light)) : 1;
+    later(points, () => {
+      trace(points);
+      context.fillStyle = look.fill;
+      context.fill();
+      context.fillStyle = `rgba(0, 0, 0, ${(1 - bright).toFixed(3)})`;
+      context.fill();
+      context.strokeStyle = look.edge;
+      context.lineWidth = look.width;
+      context.stroke();
+    }, 0.02 * extent);
   }
 
   function observed(frame) {
@@ -204,7 +247,7 @@ function spatial(run, figure, redraw) {
     }
     context.lineCap = "round";
     machine(frame);
-    for (const place of run.ground) {
+    for (const place of run.drawing.unit * scale < run.drawing.fine ? run.ground : []) {
       sprite(place, (p) => { context.fillStyle = GREY; context.fillRect(p[0] - 5, p[1] - 5, 10, 10); });
     }
     const labels = observed(frame);
