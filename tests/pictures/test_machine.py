@@ -8,9 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from matplotlib.colors import to_rgb
 from PIL import Image
+from shoal.cli import main
 from shoal.engines import get_engine
+from shoal.errors import InputError
+from shoal.pictures.emphasis import Emphasis
 from shoal.pictures.machine import shapes
 from shoal.pictures.machine.drawing import Symbol
 from shoal.pictures.machine.sheet import unit_of
@@ -201,3 +205,77 @@ def test_stills_show_drives_in_their_colour(absorber: DrawnMotion) -> None:
     picture = np.asarray(Image.open(BytesIO(png(poses(absorber, "title")))).convert("RGB"), dtype=int)
     green = 255 * np.array(to_rgb(GREEN))
     assert np.count_nonzero(np.abs(picture - green).max(axis=2) < 12) > 50
+
+
+def cantilever(**rod: Any) -> dict[str, Any]:
+    """A clamped rod at rest under a force at its tip."""
+    space = rod.get("element") == "director-rod"
+    none = [0.0] * (3 if space else 2)
+    return {
+        "name": "cantilever", "gravity": none, **({"dimensions": 3} if space else {}),
+        "bodies": {"beam": {"kind": "rod", "length": 1.0, "height": 0.02, "width": 0.01, "density": 7800.0,
+                            "youngs_modulus": 2.1e11, "element": "ancf-cable", "elements": 4, **rod}},
+        "joints": {"wall": {"kind": "weld", "first": {"body": "ground", "point": none}, "second": {"body": "beam"}}},
+        "loads": {"tip": {"kind": "force", "at": {"body": "beam", "point": "end"}, "force": [500.0, -2.0, *none[2:]]}},
+        "markers": {"tip": {"body": "beam", "point": "end"}}, "initial": {"from": "statics"},
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("rod", [{}, {"section": "round", "width": None}, {"element": "director-rod"}])
+def test_stress_is_that_of_the_closed_form(rod: dict[str, Any]) -> None:
+    """Of a cantilever, N / A + M c / I, where M is F (L - x) less that of the axial force, N times the deflection."""
+    scene = Scene.parse(cantilever(**rod))
+    found = scene_motion(scene, get_engine("gauss"), 1e-4, 2, Emphasis(stress=True))
+    assert found.stress is not None
+    s, stress = np.linspace(0.0, 1.0, 33), found.stress.values["beam"][0]
+    body = scene.flexible_rods["beam"]
+    section = body.section_at(0.0)
+    k = np.sqrt(500.0 / (2.1e11 * section.bending))
+    moment = 2.0 / k * np.sinh(k * (1.0 - s)) / np.cosh(k)  # of a tie beam; Timoshenko, Strength of Materials II
+    expected = 500.0 / section.area + moment * 0.01 / section.bending
+    # Between nodes the moment is interpolated: (k h)^2 / 8 of it.
+    assert stress[::8] == pytest.approx(expected[::8], rel=2e-3)
+    assert stress == pytest.approx(expected, rel=1.5e-2)
+    end, unit = found.stress.scale
+    assert (end, unit) == (pytest.approx(expected[0] / 1e6, rel=2e-3), "MPa")
+    assert png(poses(found, "title"))
+    shown = plain_motion(found)["stress"]
+    assert shown["most"] == f"{end:.3g} MPa"
+    assert len(shown["rods"]["beam"][0]) == 33
+
+
+def test_deflection_is_magnified_about_the_undeformed_rod() -> None:
+    scene = Scene.parse(cantilever())
+    true = scene_motion(scene, get_engine("gauss"), 1e-4, 2)
+    large = scene_motion(scene, get_engine("gauss"), 1e-4, 2, Emphasis(magnify=30.0))
+    below, larger = (one.outlines["beam"][0, :, 1] for one in (true, large))
+    np.testing.assert_allclose(larger, 30.0 * below, atol=1e-4 * abs(larger[-1]))
+    assert larger[-1] < -0.01
+    # Symbols follow what is drawn, and numbers do not.
+    assert path(large, "tip", "load")[0, 0, 1] == pytest.approx(larger[-1])
+    assert large.seats["tip"][0, 1] == pytest.approx(larger[-1])
+    np.testing.assert_array_equal(large.markers["tip"], true.markers["tip"])
+    assert "(deflection × 30)" in str(poses(large, "title").get_suptitle())
+    # A rod between two joints stays joined at both.
+    bending = load_scene("flexible-double-pendulum")
+    found = scene_motion(bending, get_engine("gauss"), 0.3, 3, Emphasis(magnify=2.0))
+    np.testing.assert_allclose(found.outlines["OA"][:, -1], found.outlines["AB"][:, 0], atol=1e-12)
+    np.testing.assert_allclose(found.seats["A"], found.markers["A"], atol=1e-12)
+
+
+def test_emphasis_of_nothing_is_refused(tmp_path: Path) -> None:
+    said = {
+        ("single-pendulum", "--magnify", "5", "--out", "x.html"): "magnify: no rod of single-pendulum bends",
+        ("single-pendulum", "--stress", "--out", "x.png"): "stress: no rod of single-pendulum bends",
+        ("flexible-double-pendulum", "--stress"): "stress: is of pictures",
+        ("flexible-double-pendulum", "--magnify", "-1", "--out", "x.gif"): "magnify: must be a positive number",
+    }
+    for arguments, words in said.items():
+        arguments = tuple(str(tmp_path / one) if one.startswith("x.") else one for one in arguments)
+        result = CliRunner().invoke(main, ["simulate", *arguments])
+        assert (result.exit_code, words in result.stderr) == (2, True), result.stderr
+        assert not list(tmp_path.iterdir())
+    numbers = {"section": "numbers", "rho_A": 1.0, "EA": 1e6, "EI": 10.0}
+    unknown = Scene.parse(cantilever(width=None, density=None, youngs_modulus=None, **numbers))
+    with pytest.raises(InputError, match="stress: no rod of cantilever has a stress that is known"):
+        scene_motion(unknown, get_engine("gauss"), 1e-4, 2, Emphasis(stress=True))

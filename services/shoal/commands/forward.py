@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 @command("simulate")
 @options.as_json
 @options.out(".html", ".gif", ".png", ".csv", ".parquet", ".nc", ".json")
-def simulate(asked: Simulate, as_json: bool, out: Out) -> None:
+@options.emphasis
+def simulate(asked: Simulate, as_json: bool, out: Out, magnify: float | None, stress: bool) -> None:
     """Say where the markers of SCENE go, and how far to trust it."""
     from shoal.engines.theory import rigid_runs
     from shoal.notebook import machine, motion
@@ -27,6 +28,7 @@ def simulate(asked: Simulate, as_json: bool, out: Out) -> None:
     from shoal.terminal import screen, tables
 
     scene = machine(asked, options.note)
+    emphasis = options.emphasised(scene, out, magnify, stress)
     what = f"simulating {scene.name} with {asked.engine}"
     what = what if asked.tolerance is None else f"{scene.name}: looking for the cheapest model"
     with screen.working(what) as tell:
@@ -34,7 +36,7 @@ def simulate(asked: Simulate, as_json: bool, out: Out) -> None:
             screen.compile_for(asked.engine, [1], scene, *(rigid_runs(scene) if asked.verify else ()))
         trajectory, scene, selection = motion(asked, scene, lambda said: tell(f"{scene.name}: {said}"))
     if out is not None:
-        files.trajectory(trajectory, scene, out, selection)
+        files.trajectory(trajectory, scene, out, selection, **emphasis)
     report = trajectory.to_json() | ({} if selection is None else {"selection": selection.to_json()})
     screen.show(report, as_json, lambda: tables.trajectory_table(trajectory, scene, selection))
     check_trusted(trajectory.ok, trajectory.message)

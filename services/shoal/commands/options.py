@@ -54,6 +54,30 @@ class EngineName(click.ParamType):  # type: ignore[type-arg]  # click 8.1 has no
 as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else.")
 
 
+def emphasis(command: Callable[..., Any]) -> Callable[..., Any]:
+    """--magnify and --stress of pictures of rods that bend."""
+    magnify = "In pictures: magnify the deflection of rods about their undeformed shape."
+    stress = "In pictures: colour rods that bend by their largest normal stress (bending and normal force)."
+    command = click.option("--stress", is_flag=True, help=stress)(command)
+    return click.option("--magnify", type=float, metavar="FACTOR", help=magnify)(command)
+
+
+def emphasised(scene: Any, out: Out, magnify: float | None, stress: bool) -> dict[str, Any]:
+    """Return what the options of `emphasis` ask of a picture of a scene. Raises InputError."""
+    if magnify is None and not stress:
+        return {}
+    from shoal.pictures.emphasis import Emphasis
+    from shoal.pictures.files import DRAWN
+
+    asked = {"magnify": 1.0 if magnify is None else magnify, "stress": stress}
+    if out is None or out.suffix not in DRAWN:
+        raise InputError(
+            f"{'stress' if magnify is None else 'magnify'}: is of pictures; add --out with {', '.join(DRAWN)}"
+        )
+    Emphasis(**asked).check(scene)
+    return asked
+
+
 def out(*endings: str, default: str | None = None, otherwise: str = "") -> Callable[[Any], Any]:
     """--out FILE, refused before anything is computed where it could not be written.
 

@@ -41,16 +41,32 @@ def save(path: Path, forms: Forms) -> None:
         part.write_bytes(content if isinstance(content, bytes) else content.encode())
 
 
-def trajectory(motion: Trajectory, scene: Scene, path: Path, selection: Selection | None = None) -> None:
+DRAWN = (".html", ".gif", ".png")
+"""Forms of a motion that are pictures."""
+
+
+def trajectory(
+    motion: Trajectory,
+    scene: Scene,
+    path: Path,
+    selection: Selection | None = None,
+    *,
+    magnify: float = 1.0,
+    stress: bool = False,
+) -> None:
     """One lane: a page that moves, a moving picture, the machine at a few instants, tables, or all there is.
 
-    selection: how the model was chosen, for the page. Raises InputError, ComputationError.
+    selection: how the model was chosen, for the page; magnify: factor of the deflection of rods in pictures; stress:
+    whether they are coloured by it. Raises InputError, ComputationError.
     """
+    from shoal.pictures.emphasis import Emphasis
+
+    emphasis = Emphasis(magnify, stress)
 
     def page() -> str:
         from shoal.pictures.simulation import simulation
 
-        return simulation(motion, scene, selection)
+        return simulation(motion, scene, selection, emphasis)
 
     def drawn(moves: bool) -> bytes:
         from shoal.pictures.gif import gif
@@ -59,7 +75,7 @@ def trajectory(motion: Trajectory, scene: Scene, path: Path, selection: Selectio
         from shoal.pictures.style import png
         from shoal.pictures.titles import ends, rejected
 
-        moving = moved(motion, scene)
+        moving = moved(motion, scene, emphasis)
         title = ends(scene.name, moving, motion.errors) if motion.ok else rejected(scene.name, motion)
         return gif(moving, title) if moves else png(poses(moving, title))
 

@@ -13,9 +13,23 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from PIL import Image
 
-from shoal.pictures.machine.strokes import is_fine, move, put, strokes
+from shoal.pictures.machine.stress import LEVELS
+from shoal.pictures.machine.strokes import colour_bar, is_fine, move, put, strokes
 from shoal.pictures.motion import DrawnMotion
-from shoal.pictures.style import BLACK, BLUE, BROWN, GREEN, GREY, ORANGE, SKY, VERMILION, canvas, headline, styled
+from shoal.pictures.style import (
+    BLACK,
+    BLUE,
+    BROWN,
+    GREEN,
+    GREY,
+    ORANGE,
+    SKY,
+    VERMILION,
+    canvas,
+    headline,
+    palette,
+    styled,
+)
 from shoal.pictures.views import views
 
 _FRAMES = 60
@@ -56,7 +70,8 @@ def _palette() -> Image.Image:
     """The colours that are drawn with and their way to white: one palette for all frames, so that nothing flickers."""
     shares = np.linspace(0.0, 1.0, _SHADES)
     colours = [np.array(to_rgb(name)) for name in (BLACK, GREY, BLUE, ORANGE, VERMILION, GREEN, SKY, BROWN)]
-    table = [255 * (share * colour + 1.0 - share) for colour in colours for share in shares]
+    scale = [255 * np.array(to_rgb(name)) for name in palette(LEVELS)]
+    table = scale + [255 * (share * colour + 1.0 - share) for colour in colours for share in shares]
     found = Image.new("P", (1, 1))
     found.putpalette(np.round(table).astype(np.uint8).tobytes())
     return found
@@ -97,19 +112,20 @@ def _stage(found: DrawnMotion, title: str) -> tuple[Figure, list[Shown], Any]:
         artists = put(axes, stroke, 0)
         if not stroke.still:
             shown.append((artists, partial(move, artists, stroke)))
-    for number, path in enumerate(found.markers.values()):
+    for number, path in enumerate(found.seats.values()):
         axes.plot(*path.T, "-", color=VERMILION, linewidth=0.8, alpha=0.4)
         line(path, "o", "" if number else "marker", color=VERMILION, markersize=6)
     for number, path in enumerate(found.measured.values()):
         line(path, "o", "" if number else "measured", color=BLACK, fillstyle="none", markersize=11)
     for number, (name, angle) in enumerate(found.directions.items()):
         arm = 0.08 * size * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-        path = np.stack([found.markers[name], found.markers[name] + arm], axis=1)
+        path = np.stack([found.seats[name], found.seats[name] + arm], axis=1)
         line(path, "-", "" if number else "measured direction", color=ORANGE, linewidth=3)
     axes.set_xlim(low[0] - 0.08 * size, high[0] + 0.08 * size)
     axes.set_ylim(low[1] - 0.08 * size, high[1] + 0.08 * size)
     axes.set_aspect("equal")
-    headline(figure, title)
+    colour_bar(figure, axes, found)
+    headline(figure, f"{title} ({found.note})" if found.note else title)
     axes.set_xlabel(found.labels[0])
     axes.set_ylabel(found.labels[1])
     if not all(found.labels):

@@ -13,19 +13,24 @@ from shoal.engines.contract import Engine
 from shoal.errors import ComputationError, InputError
 from shoal.json_values import plain
 from shoal.pictures.contacts import slack, struck
+from shoal.pictures.emphasis import TRUE, Emphasis
 from shoal.pictures.links import At, Links
 from shoal.pictures.machine.drawing import Drawing
+from shoal.pictures.machine.magnified import Magnified
 from shoal.pictures.machine.sketch import Sketch
+from shoal.pictures.machine.stress import LEVELS, Stress, stress_along
 from shoal.pictures.outline import ground, outlined
 from shoal.pictures.solids import Bar, MarkedScene
+from shoal.pictures.style import STRESS, palette
 from shoal.pictures.views import ViewDirection, views
 from shoal.scene import Rod, Scene
-from shoal.trajectory import Array
+from shoal.trajectory import Array, Trajectory
 
 if TYPE_CHECKING:
     from shoal.pictures.answer import Answer
 
 _FRAMES = 150
+_LETTERS = "0123456789abcdefghijklmnopqrstuvwxyz"
 
 
 @dataclass(frozen=True)
@@ -38,7 +43,8 @@ class DrawnMotion:
     behind: outlines of another machine that is drawn below [m], (frames, points, d)
     links: places that a spring or a distance joins [m], (frames, 2, d); slack: when ropes and struts hold nothing,
     (frames,); drawing: symbols of bodies, joints and loads; half: of the thickness of rods that bend in the plane, at
-    the points of their outlines [m], (points,)
+    the points of their outlines [m], (points,); stress: of rods, at the same points; note: what a picture has to state;
+    drawn_markers: where markers are drawn, if deflections are magnified [m], (frames, d)
     events: of contacts, as `model["events"]` has them; struck: times of impacts, by marker [s]
     In space: bars of bodies; axes of joints: a point [m] and a direction, (frames, 2, 3); up: the direction against
     gravity, along an axis, (3,).
@@ -57,6 +63,9 @@ class DrawnMotion:
     slack: dict[str, Array] = field(default_factory=dict)
     drawing: Drawing = field(default_factory=Drawing)
     half: dict[str, Array] = field(default_factory=dict)
+    stress: Stress | None = None
+    note: str = ""
+    drawn_markers: dict[str, Array] = field(default_factory=dict)
     events: Sequence[Mapping[str, Any]] = ()
     struck: dict[str, Array] = field(default_factory=dict)
     bars: dict[str, Bar] = field(default_factory=dict)
@@ -78,6 +87,11 @@ class DrawnMotion:
         return {one.part: np.broadcast_to(path := self.drawing.path(one), (frames, *path.shape[1:])) for one in shown}
 
     @property
+    def seats(self) -> dict[str, Array]:
+        """Where markers are drawn [m], (frames, d)."""
+        return self.drawn_markers or self.markers
+
+    @property
     def shaped(self) -> set[str]:
         """The bodies that are drawn by their shape, and not by the line of their outline."""
         points = {name for name, outline in self.outlines.items() if outline.shape[1] == 1 and self.drawing.symbols}
@@ -86,7 +100,7 @@ class DrawnMotion:
     @cached_property
     def box(self) -> tuple[Array, Array]:
         """Lower left and upper right corner [m] of all that is shown, (2,) each."""
-        parts = (self.outlines, self.behind, self.measured, self.links, self.thin)
+        parts = (self.outlines, self.behind, self.measured, self.links, self.thin, self.seats)
         moving = (path for part in parts for path in part.values())
         solid = (bar.edges for bar in self.bars.values())
         shown = (*moving, *solid, *self.drawing.places, self.ground)
@@ -122,6 +136,7 @@ class DrawnMotion:
             ground=self.ground @ view.plane,
             outlines=flat(self.outlines),
             markers=flat(self.markers),
+            drawn_markers=flat(self.drawn_markers),
             measured=flat(self.measured),
             behind=flat(self.behind),
             links=flat(self.links),
@@ -134,12 +149,16 @@ class DrawnMotion:
         )
 
 
-def scene_motion(scene: Scene, engine: Engine, until: float, frames: int = _FRAMES) -> DrawnMotion:
+def scene_motion(
+    scene: Scene, engine: Engine, until: float, frames: int = _FRAMES, emphasis: Emphasis = TRUE
+) -> DrawnMotion:
     """The motion of a scene until a time [s], as far as it can be computed. Raises InputError, ComputationError."""
+    emphasis.check(scene)
     if until <= 0:
         raise InputError("out: a motion that is shown lasts longer than 0 s; choose later times with --at")
-    traced, read = traced_out(scene)
-    seen = engine.simulate(traced, np.linspace(0.0, until, frames))
+    traced, read = traced_out(scene, emphasis)
+    whole = {"whole": True} if emphasis.stress else {}
+    seen = engine.simulate(traced, np.linspace(0.0, until, frames), **whole)
     known = np.all(np.isfinite(seen.points[..., 0]), axis=(1, 2))
     count = frames if np.all(known) else int(np.argmin(known))
     if count < 2:
@@ -147,28 +166,45 @@ def scene_motion(scene: Scene, engine: Engine, until: float, frames: int = _FRAM
     markers = {name: seen.marker(name)[:count] for name in scene.markers}
     shown = read(lambda name: seen.marker(name)[:count], seen.times[:count])
     events = seen.model.get("events", ())
-    happened = {"events": events, "struck": struck(scene, events)}
+    happened: dict[str, Any] = {"events": events, "struck": struck(scene, events)}
+    if emphasis.stress:
+        along = {name: shown["outlines"][name].shape[1] for name in scene.flexible_rods}
+        happened["stress"] = stress_along(_until(seen, count), scene, along)
     return DrawnMotion(scene.name, seen.times[:count], ground(scene), markers=markers, **happened, **shown)
 
 
-def traced_out(scene: Scene) -> tuple[Scene, Callable[[At, Array], dict[str, Any]]]:
+def _until(run: Trajectory, count: int) -> Trajectory:
+    """Return the first instants of a run, as far as it is known."""
+    if run.states is None or count == len(run.times):
+        return run
+    states = replace(run.states, **{name: getattr(run.states, name)[:count] for name in ("q", "v", "contacts")})
+    return replace(run, times=run.times[:count], states=states)
+
+
+def traced_out(scene: Scene, emphasis: Emphasis = TRUE) -> tuple[Scene, Callable[[At, Array], dict[str, Any]]]:
     """Return the scene with markers that show its bodies, and what makes fields of a DrawnMotion of their paths.
 
     These are the paths of a marker by its name [m], (frames, d), and the times of the motion [s], (frames,).
     """
     traced, points = outlined(scene)
     links, sketch = Links(scene), Sketch(scene)
+    magnified = None if emphasis.magnify == 1.0 else Magnified(scene, emphasis.magnify)
     solids = MarkedScene(traced, points, scene) if scene.dimensions == 3 else None
     data = (traced if solids is None else solids.scene).model_dump(mode="json")
-    data["markers"] |= links.markers | sketch.markers
+    data["markers"] |= links.markers | sketch.markers | (magnified.markers if magnified else {})
     rods = scene.flexible_rods if scene.dimensions == 2 else {}
     half = {name: _half(rod, len(points[name])) for name, rod in rods.items()}
 
     def read(at: At, times: Array) -> dict[str, Any]:
+        larger = {}
+        if magnified is not None:
+            at = magnified.of(at, data["markers"])
+            larger = {"drawn_markers": {name: at(name) for name in scene.markers}, "note": emphasis.note}
         outlines = {body: np.stack([at(name) for name in names], axis=1) for body, names in points.items()}
         joined = links.shown(at, times)
         drawing = sketch.drawing(at, times, outlines.values(), joined.values())
         shown = {"outlines": outlines, "links": joined, "slack": slack(scene, joined), "drawing": drawing, "half": half}
+        shown |= larger
         return shown if solids is None else {**shown, "up": upwards(scene), **solids.shown(at, len(times))}
 
     return Scene.parse(data, scene.name), read
@@ -245,11 +281,20 @@ def plain_motion(found: DrawnMotion) -> dict[str, Any]:
         "slack": {name: x.tolist() for name, x in found.slack.items()},
         "drawing": found.drawing.to_json(digits),
         "half": {name: plain(np.round(x, digits + 1)) for name, x in found.half.items()},
-        "markers": {name: plain(np.round(x, digits)) for name, x in found.markers.items()},
+        "markers": {name: plain(np.round(x, digits)) for name, x in found.seats.items()},
+        "note": found.note,
+        "stress": None if found.stress is None else _plain_stress(found.stress),
         "measured": {name: plain(np.round(x, digits)) for name, x in found.measured.items()},
         "directions": {name: plain(np.round(x, 4)) for name, x in found.directions.items()},
         **space,
     }
+
+
+def _plain_stress(found: Stress) -> dict[str, Any]:
+    """Return the palette, the end of the scale, and a letter of base 36 for the colour of each point."""
+    most, unit = found.scale
+    rods = {name: ["".join(_LETTERS[k] for k in row) for row in found.levels(name).tolist()] for name in found.values}
+    return {"palette": palette(LEVELS), "label": STRESS, "most": f"{most:.3g} {unit}", "rods": rods}
 
 
 def _plain_space(found: DrawnMotion, digits: int) -> dict[str, Any]:

@@ -62,6 +62,10 @@ def animation(found: DrawnMotion, what: str) -> dict[str, Any]:
     caption = f"{shown[0]}{over}; hatched is the ground.{loaded} The arrow keys move the slider."
     if found.up is not None:
         caption = f"{shown[0]}{over}; {_SPACE}{loaded}"
+    if found.stress is not None:
+        caption += " Rods are coloured by their largest normal stress, of bending and normal force."
+    if found.note:
+        caption += f" The {found.note}: about the undeformed rod, and no motion is to scale there."
     return {
         "name": found.name,
         "aspect": round(found.aspect, 3),

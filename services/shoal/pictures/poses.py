@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
 from shoal.pictures.contacts import mark_impacts
-from shoal.pictures.machine.strokes import is_fine, put, strokes
+from shoal.pictures.machine.strokes import colour_bar, is_fine, put, strokes
 from shoal.pictures.motion import DrawnMotion
 from shoal.pictures.style import BLACK, BLUE, GREY, LOOKS, ORANGE, VERMILION, canvas, headline, styled
 from shoal.pictures.views import views
@@ -42,7 +42,8 @@ def poses(found: DrawnMotion, title: str, way: str = "paths of the markers") -> 
             _draw(axes, seen, way)
             _frame(axes, seen, 0.55 * found.size, view.name)
         shown = front
-    headline(figure, title)
+    colour_bar(figure, shown if found.up is None else corner, found)
+    headline(figure, f"{title} ({found.note})" if found.note else title)
     figure.legend(*shown.get_legend_handles_labels(), loc="outside lower left", ncols=3)
     return figure
 
@@ -87,12 +88,12 @@ def _draw(axes: Axes, found: DrawnMotion, way: str) -> None:
         )
     for number, place in enumerate(found.measured.values()):
         axes.plot(*place.T, "o", color=BLACK, markersize=4, fillstyle="none", label="" if number else "measured")
-    for number, path in enumerate(found.markers.values()):
+    for number, path in enumerate(found.seats.values()):
         axes.plot(*path.T, color=VERMILION, linewidth=1.2, label="" if number else way)
     hit = [name for name, hits in found.struck.items() if len(hits)]
     for name in hit:
         label = "impact" if name == hit[0] else ""
-        mark_impacts(axes, found.times, found.markers[name], found.struck[name], label)
+        mark_impacts(axes, found.times, found.seats[name], found.struck[name], label)
     _names(axes, found)
     _directions(axes, found, chosen)
     axes.set_xlabel(found.labels[0])
@@ -103,10 +104,10 @@ def _names(axes: Axes, found: DrawnMotion) -> None:
     """The names of the markers where they end; those in one place stand in one line."""
     low, high = found.box
     places: dict[tuple[int, ...], list[str]] = {}
-    for name, path in found.markers.items():
+    for name, path in found.seats.items():
         places.setdefault(tuple(np.round(50 * (path[-1] - low) / np.max(high - low)).astype(int)), []).append(name)
     for names in places.values():
-        place = found.markers[names[0]][-1]
+        place = found.seats[names[0]][-1]
         axes.annotate(
             ", ".join(names), place, (6, 4), textcoords="offset points", fontweight="bold", path_effects=_HALO
         )
@@ -118,6 +119,6 @@ def _directions(axes: Axes, found: DrawnMotion, chosen: np.ndarray[tuple[int], n
     length = 0.08 * float(np.max(high - low))
     for number, (marker, angle) in enumerate(found.directions.items()):
         for k in chosen:
-            tip = found.markers[marker][k] + length * np.array([np.cos(angle[k]), np.sin(angle[k])])
+            tip = found.seats[marker][k] + length * np.array([np.cos(angle[k]), np.sin(angle[k])])
             label = "measured direction" if number == 0 and k == chosen[0] else ""
-            axes.plot(*np.stack([found.markers[marker][k], tip]).T, color=ORANGE, linewidth=2, label=label)
+            axes.plot(*np.stack([found.seats[marker][k], tip]).T, color=ORANGE, linewidth=2, label=label)

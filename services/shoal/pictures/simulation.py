@@ -10,6 +10,7 @@ from shoal.engines import get_engine
 from shoal.findings import sentence
 from shoal.pictures.choice import rows, tells_places, why
 from shoal.pictures.drawn import Drawn
+from shoal.pictures.emphasis import TRUE, Emphasis
 from shoal.pictures.estimates import budget, estimates, grade
 from shoal.pictures.ladder import ladder
 from shoal.pictures.motion import DrawnMotion, scene_motion
@@ -26,9 +27,11 @@ if TYPE_CHECKING:
     from shoal.selection import Selection
 
 
-def simulation(trajectory: Trajectory, scene: Scene, selection: Selection | None = None) -> str:
+def simulation(
+    trajectory: Trajectory, scene: Scene, selection: Selection | None = None, emphasis: Emphasis = TRUE
+) -> str:
     """The page as HTML without a reference to anything outside. Raises InputError, ComputationError."""
-    moving = moved(trajectory, scene)
+    moving = moved(trajectory, scene, emphasis)
     return page(trajectory, scene, moving, drawn(trajectory, scene, moving, selection), selection)
 
 
@@ -74,9 +77,9 @@ def _remarks(trajectory: Trajectory, selection: Selection | None) -> list[str]:
     return [sentence(one.text) for one in found] + [f"{one[0].upper()}{one[1:]}." for one in estimates(trajectory)]
 
 
-def moved(trajectory: Trajectory, scene: Scene) -> DrawnMotion:
+def moved(trajectory: Trajectory, scene: Scene, emphasis: Emphasis = TRUE) -> DrawnMotion:
     """The same run with the outlines of its bodies. Raises InputError, ComputationError."""
-    return scene_motion(scene, get_engine(trajectory.engine), float(trajectory.times[-1]))
+    return scene_motion(scene, get_engine(trajectory.engine), float(trajectory.times[-1]), emphasis=emphasis)
 
 
 def _lead(trajectory: Trajectory, selection: Selection | None) -> str:

@@ -10,8 +10,9 @@ from textwrap import fill
 from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
-from matplotlib import rc_context
+from matplotlib import colormaps, rc_context
 from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullFormatter
 
@@ -89,6 +90,15 @@ LOOKS: dict[str, dict[str, Any]] = {
 Faces of solids are seen from outside alone.
 
 Okabe and Ito's colours: blue moves, dark grey stands or is elastic, green drives and loads."""
+
+STRESS = "largest normal stress"
+"""What the colours of rods show."""
+
+
+def palette(count: int) -> list[str]:
+    """Return colours from low to high of a scale that colour-blind readers see as even, and that grows lighter."""
+    return [to_hex(colormaps["cividis"](share)) for share in np.linspace(0.0, 1.0, count)]
+
 
 _RC: Any = {
     "font.family": "DejaVu Sans",

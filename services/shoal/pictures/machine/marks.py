@@ -23,10 +23,10 @@ STILL = "still"
 
 
 class Marks:
-    """The markers that symbols of a scene need; markers do not change a model."""
+    """The markers that symbols of a scene need; markers do not change a model. kind: of their names."""
 
-    def __init__(self, scene: Scene) -> None:
-        self.scene = scene
+    def __init__(self, scene: Scene, kind: str = "symbol") -> None:
+        self.scene, self._kind = scene, kind
         self.markers: dict[str, dict[str, Any]] = {}
         self._names: dict[Any, str] = {}
         self._away = span(scene)
@@ -90,7 +90,7 @@ class Marks:
     def _path(self, body: str, place: Any) -> Path:
         key = body, tuple(float(x) for x in place)
         if key not in self._names:
-            self._names[key] = name = f"{INSIDE}-symbol-{len(self.markers)}"
+            self._names[key] = name = f"{INSIDE}-{self._kind}-{len(self.markers)}"
             self.markers[name] = {"body": body, "point": list(key[1])}
         name = self._names[key]
         return lambda at, _: at(name)

@@ -9,13 +9,17 @@ from typing import Any
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import ListedColormap, Normalize
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
 
 from shoal.pictures.machine.bodies import ribbon
 from shoal.pictures.machine.drawing import ALWAYS, FINE
+from shoal.pictures.machine.stress import LEVELS
 from shoal.pictures.motion import DrawnMotion
-from shoal.pictures.style import LOOKS
+from shoal.pictures.style import DARK, LOOKS, PALE, STRESS, palette
 from shoal.trajectory import Array
 
 _WIDTH = 480.0
@@ -26,11 +30,12 @@ _POINTS = 0.75
 
 @dataclass(frozen=True)
 class Stroke:
-    """Lines of one look; path: of a frame [m], (points, 2), nan between lines."""
+    """Lines of one look; path: of a frame [m], (points, 2), nan between lines; tint: colour of a frame, of stress."""
 
     look: dict[str, Any]
     path: Callable[[int], Array]
     still: bool
+    tint: Callable[[int], str] | None = None
 
 
 def is_fine(found: DrawnMotion) -> bool:
@@ -46,9 +51,12 @@ def strokes(found: DrawnMotion) -> list[Stroke]:
         for one in drawing.symbols
         if fine or one.look in ALWAYS
     ]
+    tinted = {} if found.stress is None else found.stress.values
     for name, half in found.half.items():
-        outline = found.outlines[name]
-        shown.append(Stroke(LOOKS["body"], _strip(outline, half), still=False))
+        if name not in tinted:
+            shown.append(Stroke(LOOKS["body"], _strip(found.outlines[name], half), still=False))
+    for name in tinted:
+        shown += _tinted(found, name)
     return sorted(shown, key=lambda stroke: float(stroke.look["layer"]))
 
 
@@ -58,6 +66,30 @@ def _at(found: DrawnMotion, symbol: Any) -> Callable[[int], Array]:
 
 def _strip(outline: Array, half: Array) -> Callable[[int], Array]:
     return lambda k: ribbon(outline[k : k + 1], half)[0]
+
+
+def _tinted(found: DrawnMotion, name: str) -> Iterator[Stroke]:
+    """Yield the parts of a rod between its points, coloured by their stress, and its edge; lines on paper of space."""
+    assert found.stress is not None
+    outline, levels, colours = found.outlines[name], found.stress.levels(name), palette(LEVELS)
+    half = found.half.get(name)
+    look = {"layer": 3.1, "edge": DARK, "width": 3.5 if half is None else 0.4, "fill": None if half is None else PALE}
+    for part in range(outline.shape[1] - 1):
+        ends = outline[:, part : part + 2]
+        path = (lambda k, ends=ends: ends[k]) if half is None else _strip(ends, half[part : part + 2])
+        tint = levels[:, part : part + 2].max(axis=1)
+        yield Stroke(look, path, still=False, tint=lambda k, tint=tint: colours[tint[k]])  # type: ignore[misc]
+    if half is not None:
+        edge = {"layer": 3.2, "edge": DARK, "width": 1.0, "fill": None}
+        yield Stroke(edge, _strip(outline, half), still=False)
+
+
+def colour_bar(figure: Figure, axes: Axes, found: DrawnMotion) -> None:
+    """Draw the scale of the colours, with its unit, beside some axes; nothing without stress."""
+    if found.stress is not None:
+        most, unit = found.stress.scale
+        colours = ScalarMappable(Normalize(0.0, most or 1.0), ListedColormap(palette(LEVELS)))
+        figure.colorbar(colours, ax=axes, label=f"{STRESS} [{unit}]", shrink=0.8, pad=0.02)
 
 
 def pieces(path: Array) -> Iterator[Array]:
@@ -87,13 +119,14 @@ def put(axes: Axes, stroke: Stroke, frame: int, alpha: float = 1.0) -> list[Arti
     look = stroke.look
     width, order = _POINTS * float(look["width"]), 2.0 + 0.1 * float(look["layer"])
     made: list[Artist] = []
+    tint = None if stroke.tint is None else stroke.tint(frame)
     for line in _seen(stroke, frame):
         one: Artist
         if look["fill"] is None:
-            one = Line2D(*line.T, color=look["edge"], linewidth=width, alpha=alpha, zorder=order)
+            one = Line2D(*line.T, color=tint or look["edge"], linewidth=width, alpha=alpha, zorder=order)
             axes.add_line(one)
         else:
-            colours = {"facecolor": look["fill"], "edgecolor": look["edge"]}
+            colours = {"facecolor": tint or look["fill"], "edgecolor": tint or look["edge"]}
             one = Polygon(line, **colours, linewidth=width, alpha=alpha, zorder=order)
             axes.add_patch(one)
         made.append(one)
@@ -103,6 +136,8 @@ def put(axes: Axes, stroke: Stroke, frame: int, alpha: float = 1.0) -> list[Arti
 def move(artists: list[Artist], stroke: Stroke, frame: int) -> None:
     """Let the artists of a stroke show another frame."""
     for one, line in zip(artists, _seen(stroke, frame), strict=True):
+        if stroke.tint is not None:
+            one.set(color=stroke.tint(frame))
         if isinstance(one, Polygon):
             one.set_xy(line)
         elif isinstance(one, Line2D):

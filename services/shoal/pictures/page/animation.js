@@ -68,7 +68,8 @@ function animate(figure) {
 
   function draw() {
     context.clearRect(0, 0, width, height);
-    if (space) space(frame, width, height); else plane();
+    if (space) space(frame, width, height, tint); else plane();
+    legend();
     slider.value = frame;
     clock.textContent = `t = ${run.times[frame].toFixed(3)} s`;
     slider.setAttribute("aria-valuetext", clock.textContent);
@@ -104,6 +105,23 @@ function animate(figure) {
     }
   }
 
+  // The colour of a part of a rod: that of the larger stress at its ends.
+  function tint(levels, k) {
+    return run.stress.palette[Math.max(parseInt(levels[k], 36), parseInt(levels[k + 1], 36))];
+  }
+
+  // The scale of stress, and what the picture has to state.
+  function legend() {
+    if (run.note) text(run.note, 12, 22, "#444", "bold");
+    if (!run.stress) return;
+    const { palette, label, most } = run.stress, bar = Math.min(180, width / 2), left = width - bar - 12;
+    palette.forEach((colour, k) => {
+      context.fillStyle = colour;
+      context.fillRect(left + bar * k / palette.length, 10, bar / palette.length + 1, 12);
+    });
+    text(`${label}: 0 to ${most}`, left + bar - context.measureText(`${label}: 0 to ${most}`).width, 38, "#444", "normal");
+  }
+
   // The outline of a rod that bends, with its thickness.
   function strip(points, half) {
     const normals = points.map((_, k) => {
@@ -134,7 +152,14 @@ function animate(figure) {
     for (const [name, outline] of Object.entries(run.outlines)) {
       const half = run.half[name];
       things.push({ look: looks.body, draw: (look) => {
-        if (half) shape(strip(outline[frame], half), to, look);
+        const tints = run.stress?.rods[name]?.[frame];
+        if (half && tints) {
+          for (let k = 0; k + 1 < tints.length; k += 1) {
+            const colour = tint(tints, k);
+            shape(strip(outline[frame].slice(k, k + 2), half.slice(k, k + 2)), to, { fill: colour, edge: colour, width: 0.5 });
+          }
+          shape(strip(outline[frame], half), to, { edge: "#4A4A4A", width: 1 });
+        } else if (half) shape(strip(outline[frame], half), to, look);
         else line(outline[frame].map(to), BLUE, 4);
       } });
     }

@@ -87,7 +87,7 @@ function spatial(run, figure, redraw) {
   }
 
   // A bar as faces between rings of corners; without `side` its rotation about its axis is unknown.
-  function bar(axis, side, size, clear, round) {
+  function bar(axis, side, size, clear, round, colour) {
     const least = 3.5 / scale, count = axis.length, parts = count === 2 && !clear ? 8 : 1, rings = [];
     const corners = clear || count === 2 ? 16 : 8;
     let across = side ? side[0] : Math.abs(dot(unit(add(axis[1], axis[0], -1)), up)) < 0.9 ? up : right;
@@ -108,7 +108,8 @@ function spatial(run, figure, redraw) {
         for (let n = 0; n < sides; n += 1) {
           const m = (n + 1) % sides;
           // The face that the height points to is of another colour, so that a turn about the axis is seen.
-          face([from[n], from[m], until[m], until[n]], side && n === sides - 1 ? [86, 180, 233] : [0, 114, 178], clear);
+          const plain = side && n === sides - 1 ? [86, 180, 233] : [0, 114, 178];
+          face([from[n], from[m], until[m], until[n]], colour ? colour(k) : plain, clear);
         }
       }
     }
@@ -151,10 +152,11 @@ function spatial(run, figure, redraw) {
     }
   }
 
-  function machine(frame) {
+  function machine(frame, tint) {
     for (const [name, outline] of Object.entries(run.outlines)) {
-      const body = run.bars[name], points = outline[frame];
-      if (body) bar((body.axis || run.outlines[name])[frame], body.side && body.side[frame], body.size, body.clear, body.round);
+      const body = run.bars[name], points = outline[frame], tints = run.stress?.rods[name]?.[frame];
+      const colours = tints && ((k) => tint(tints, k).match(/\w\w/g).map((part) => parseInt(part, 16)));
+      if (body) bar((body.axis || run.outlines[name])[frame], body.side && body.side[frame], body.size, body.clear, body.round, colours);
       if (body && !body.clear) continue;
       for (let k = 0; k + 1 < points.length; k += 1) line([points[k], points[k + 1]], "#0072B2", 4);
       if (!body) sprite(points[0], (p) => dots(p, 7, "#0072B2"));
@@ -234,7 +236,7 @@ function spatial(run, figure, redraw) {
     return Object.values(labels);
   }
 
-  function paint(frame, width, height) {
+  function paint(frame, width, height, tint) {
     look(width, height);
     things = [];
     context.lineCap = context.lineJoin = "round";
@@ -246,7 +248,7 @@ function spatial(run, figure, redraw) {
       stroke(shadow, "#D8D8D8", Math.max(2.5, body ? scale * Math.min(...body.size[0]) : 0));
     }
     context.lineCap = "round";
-    machine(frame);
+    machine(frame, tint);
     for (const place of run.drawing.unit * scale < run.drawing.fine ? run.ground : []) {
       sprite(place, (p) => { context.fillStyle = GREY; context.fillRect(p[0] - 5, p[1] - 5, 10, 10); });
     }
