@@ -252,7 +252,7 @@ def test_deflection_is_magnified_about_the_undeformed_rod() -> None:
     np.testing.assert_allclose(larger, 30.0 * below, atol=1e-4 * abs(larger[-1]))
     assert larger[-1] < -0.01
     # Symbols follow what is drawn, and numbers do not.
-    assert path(large, "tip", "load")[0, 0, 1] == pytest.approx(larger[-1])
+    assert large.drawing.carriers["tip +1"].place[0, 1] == pytest.approx(larger[-1])
     assert large.seats["tip"][0, 1] == pytest.approx(larger[-1])
     np.testing.assert_array_equal(large.markers["tip"], true.markers["tip"])
     assert "(deflection × 30)" in str(poses(large, "title").get_suptitle())

@@ -82,7 +82,8 @@ def helix(u: float) -> Array:
 def spiral(u: float) -> Array:
     """Return the spiral of a torsion spring about its place, (points, 2)."""
     angle = np.linspace(0.0, 2 * np.pi * 2.25, 64)
-    return np.stack([np.cos(angle), np.sin(angle)], axis=1) * (u * (0.6 + 1.2 * angle / angle[-1]))[:, None]
+    radius = u * (0.6 + 1.2 * angle / angle[-1])
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
 
 
 def arrow() -> Array:

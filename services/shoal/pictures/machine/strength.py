@@ -8,7 +8,7 @@ import numpy as np
 
 from shoal.scene import Scene
 from shoal.scene.formula import OPERATIONS, Node
-from shoal.scene.function import SignalFunction
+from shoal.scene.function import Function, SignalFunction
 from shoal.scene.loads import Force, Torque
 from shoal.scene.signals import Constant, Table, written_out
 from shoal.trajectory import Array
@@ -29,7 +29,8 @@ def _value(scene: Scene, node: Node, times: Array) -> Any:
         arguments = [_value(scene, argument, times) for argument in node[1:]]
         return None if any(one is None for one in arguments) else OPERATIONS[node[0]](*arguments)
     if isinstance(node, Constant | Table):
-        return scene.signals[node.name](times)
+        signal = scene.signals[node.name]
+        return signal(times) if isinstance(signal, Function) else None
     if isinstance(node, float):
         return node
     return times if node == "t" else None
