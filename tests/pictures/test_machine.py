@@ -18,9 +18,9 @@ from shoal.pictures.emphasis import Emphasis
 from shoal.pictures.machine import shapes
 from shoal.pictures.machine.drawing import Symbol
 from shoal.pictures.machine.sheet import unit_of
-from shoal.pictures.machine.strokes import pieces
 from shoal.pictures.motion import DrawnMotion, plain_motion, scene_motion
 from shoal.pictures.poses import poses
+from shoal.pictures.strokes import pieces
 from shoal.pictures.style import GREEN, png
 from shoal.scene import Scene, load_scene
 from shoal.trajectory import Array

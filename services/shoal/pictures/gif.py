@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from shoal.pictures.machine.stress import LEVELS
-from shoal.pictures.machine.strokes import colour_bar, is_fine, move, put, strokes
 from shoal.pictures.motion import DrawnMotion
+from shoal.pictures.strokes import colour_bar, is_fine, move, put, strokes
 from shoal.pictures.style import (
     BLACK,
     BLUE,

@@ -8,8 +8,8 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
 from shoal.pictures.contacts import mark_impacts
-from shoal.pictures.machine.strokes import colour_bar, is_fine, put, strokes
 from shoal.pictures.motion import DrawnMotion
+from shoal.pictures.strokes import colour_bar, is_fine, put, strokes
 from shoal.pictures.style import BLACK, BLUE, GREY, LOOKS, ORANGE, VERMILION, canvas, headline, styled
 from shoal.pictures.views import views
 
