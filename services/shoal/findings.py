@@ -13,7 +13,7 @@ Order = TypeVar("Order", bound=StrEnum)
 
 
 class Severity(StrEnum):
-    """What a finding does to an answer."""
+    """Effect of a finding on an answer."""
 
     NOTE = "note"
     """The answer holds; this explains it."""
@@ -44,7 +44,7 @@ class Kind:
 
 @dataclass(frozen=True)
 class Finding:
-    """What was found out about an answer.
+    """Result of a diagnostic about an answer.
 
     text: one sentence or clause without a full stop; steps: what to do about this finding, before the general remedy
     numbers: the quantities that the text mentions, in SI units
@@ -75,6 +75,26 @@ class Finding:
         """Return the finding that `to_json` wrote; its kind is known by its code, severity and implied status."""
         kind = Kind(said["code"], Severity(said["severity"]), "", "", said["implies"])
         return cls(kind, said["text"], tuple(said["do"]), said["numbers"])
+
+
+def rejects(code: str, implies: str, meaning: str, remedy: str = "") -> Kind:
+    """Return a kind of finding with which the answer cannot be used."""
+    return Kind(code, Severity.REJECTION, meaning, remedy, implies)
+
+
+def limits(code: str, implies: str, meaning: str, remedy: str = "") -> Kind:
+    """Return a kind of finding with which a part of the answer can be used."""
+    return Kind(code, Severity.CAUTION, meaning, remedy, implies)
+
+
+def cautions(code: str, meaning: str, remedy: str = "") -> Kind:
+    """Return a kind of finding that limits the answer, and leaves its status as it is."""
+    return Kind(code, Severity.CAUTION, meaning, remedy)
+
+
+def notes(code: str, meaning: str, remedy: str = "") -> Kind:
+    """Return a kind of finding that explains the answer."""
+    return Kind(code, Severity.NOTE, meaning, remedy)
 
 
 def message(findings: Iterable[Finding]) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from enum import StrEnum
 
-from shoal.findings import Finding, Kind, Severity, worst_implied
+from shoal.findings import Finding, cautions, rejects, worst_implied
 
 
 class ResponseStatus(StrEnum):
@@ -33,189 +33,179 @@ def in_order(findings: Iterable[Finding]) -> list[Finding]:
     return sorted(findings, key=lambda one: -order.index(ResponseStatus(one.kind.implies or ResponseStatus.OK)))
 
 
-def _rejects(code: str, status: ResponseStatus, meaning: str, remedy: str = "") -> Kind:
-    return Kind(code, Severity.REJECTION, meaning, remedy, status)
-
-
 _MORE = "allow more runs (--limit-runs)"
 _MODEL = "state a tolerance, so that a better model is chosen (--tolerance)"
 
 # The study itself.
-TIME_OVER = _rejects(
+TIME_OVER = rejects(
     "time-over",
     ResponseStatus.TIME,
     "The time limit was reached before the study was complete.",
     "allow more time; with --checkpoint the same study continues where it ended",
 )
-RUNS_FAILED = _rejects(
+RUNS_FAILED = rejects(
     "runs-failed",
     ResponseStatus.RUNS,
     "Some runs failed, with smaller steps too, so that statistics and bounds leave them out.",
     "narrow the parameters to values with which the machine can be assembled and moves",
 )
-MODEL_REJECTED = _rejects(
+MODEL_REJECTED = rejects(
     "model-rejected",
     ResponseStatus.REJECTED,
     "A decisive run was repeated more carefully, and its checks reject the model or its steps.",
     "refine the mesh, shorten the step, or " + _MODEL,
 )
-BEYOND_HORIZON = _rejects(
+BEYOND_HORIZON = rejects(
     "beyond-horizon",
     ResponseStatus.HORIZON,
     "Beyond a horizon small changes of the parameters change the motion so much that no surrogate follows.",
     "end the study at the horizon (--at), or narrow the parameters",
 )
-GAP_NOT_REACHED = _rejects(
+GAP_NOT_REACHED = rejects(
     "gap-not-reached",
     ResponseStatus.GAP,
     "Outer and attained bounds are further apart than was asked for.",
     "allow more runs (--runs), or ask for a larger gap",
 )
-DEVIATION_IN_DOUBT = _rejects(
+DEVIATION_IN_DOUBT = rejects(
     "deviation-in-doubt",
     ResponseStatus.DEVIATION,
     "Standard deviations over interval values are known roughly only.",
     "allow more runs (--runs), or narrow the intervals",
 )
-OUTER_UNKNOWN = Kind(
+OUTER_UNKNOWN = cautions(
     "outer-bounds-unknown",
-    Severity.CAUTION,
     "Bounds are those of runs; the method does not estimate how far beyond them other values lie.",
     "use a method with outer bounds, such as --method auto",
 )
-RARE_MISSED = Kind(
+RARE_MISSED = cautions(
     "rare-values-missed",
-    Severity.CAUTION,
     "The probability of a limit implies a larger standard deviation than the statistics; their errors are enlarged.",
 )
-DIFFERENT_EVENTS = Kind(
+DIFFERENT_EVENTS = cautions(
     "different-events",
-    Severity.CAUTION,
     "Runs have different sequences of events of contacts, each in a part of the parameters of its own; rarer ones may "
     "be unseen.",
 )
-STARTS_ELSEWHERE = Kind(
+STARTS_ELSEWHERE = cautions(
     "starts-elsewhere",
-    Severity.CAUTION,
     "Some runs start elsewhere than stated, because their joints could not be closed there.",
     "narrow the parameters, or leave the start of the bodies named to a guess",
 )
 
 # Limits: their probability or decision is in doubt.
-UNDECIDED = _rejects(
+UNDECIDED = rejects(
     "limit-undecided",
     ResponseStatus.LIMIT,
     "No run exceeds the limit, and the outer bounds do not show that none does.",
     "allow more runs (--runs), or ask for a smaller gap (--gap)",
 )
-WITHIN_ERROR = _rejects(
+WITHIN_ERROR = rejects(
     "limit-within-error",
     ResponseStatus.LIMIT,
     "The known error of the model is as large as the least margin to the limit.",
     _MODEL,
 )
-ERROR_UNKNOWN = _rejects(
+ERROR_UNKNOWN = rejects(
     "limit-error-unknown",
     ResponseStatus.LIMIT,
     "An error of the model was not estimated for the quantity of the limit.",
 )
-ERROR_DECIDES = _rejects(
+ERROR_DECIDES = rejects(
     "limit-error-decides",
     ResponseStatus.LIMIT,
     "The known error of the model may change the reliability index by more than a quarter.",
     _MODEL,
 )
-LIMIT_RUNS_FAILED = _rejects(
+LIMIT_RUNS_FAILED = rejects(
     "limit-runs-failed",
     ResponseStatus.LIMIT,
     "Some runs for the limit failed, with smaller steps too.",
     "narrow the parameters to values with which the machine can be assembled and moves",
 )
-SHOWN_REJECTED = _rejects(
+SHOWN_REJECTED = rejects(
     "limit-run-rejected",
     ResponseStatus.LIMIT,
     "The run at the design point, or with the least margin, was refused or its checks reject it.",
 )
-INTERVALS_UNDECIDED = _rejects(
+INTERVALS_UNDECIDED = rejects(
     "interval-values-undecided",
     ResponseStatus.LIMIT,
     "Interval values that were not examined may change the reliability index by more than a quarter.",
     "narrow the intervals, or " + _MORE,
 )
-NO_DESIGN_POINT = _rejects(
+NO_DESIGN_POINT = rejects(
     "no-design-point",
     ResponseStatus.LIMIT,
     "FORM found no design point: no place where the limit is exceeded.",
     "use --limit-method auto or subset",
 )
-FORM_NOT_CONVERGED = _rejects(
+FORM_NOT_CONVERGED = rejects(
     "form-not-converged",
     ResponseStatus.LIMIT,
     "The search of FORM for the design point did not converge.",
     "use --limit-method auto",
 )
-SEVERAL_DESIGN_POINTS = _rejects(
+SEVERAL_DESIGN_POINTS = rejects(
     "several-design-points",
     ResponseStatus.LIMIT,
     "Several design points were found, and FORM takes the nearest only.",
     "use --limit-method auto",
 )
-DESIGN_POINTS_MISSED = _rejects(
+DESIGN_POINTS_MISSED = rejects(
     "design-points-missed",
     ResponseStatus.LIMIT,
     "The search for design points had not ended, so that some may be missing.",
     _MORE,
 )
-NONE_EXCEEDS = _rejects(
+NONE_EXCEEDS = rejects(
     "none-exceeds-at-design-point",
     ResponseStatus.LIMIT,
     "No run around a design point exceeds the limit.",
     _MORE,
 )
-CONTRADICTED = _rejects(
+CONTRADICTED = rejects(
     "contradicted-by-runs",
     ResponseStatus.LIMIT,
     "A binomial test of runs drawn from the distributions contradicts the probability.",
     _MORE,
 )
-ESTIMATES_DIFFER = _rejects(
+ESTIMATES_DIFFER = rejects(
     "estimates-differ",
     ResponseStatus.LIMIT,
     "Two independent estimates of the probability differ by more than chance explains.",
     _MORE,
 )
-COARSE = _rejects(
+COARSE = rejects(
     "coarse-probability",
     ResponseStatus.LIMIT,
     "The coefficient of variation of the probability is large.",
     _MORE,
 )
-EXCEEDED_BETWEEN = Kind(
+EXCEEDED_BETWEEN = cautions(
     "exceeded-between-instants",
-    Severity.CAUTION,
     "The run with the least margin exceeds the limit between the instants examined.",
     "state more instants (--at)",
 )
-OPPOSITE = Kind(
+OPPOSITE = cautions(
     "nearly-always-exceeded",
-    Severity.CAUTION,
     "The limit is exceeded nearly always: it may have been stated the other way round.",
     "state what must hold as a requirement (--require), what must not happen as a limit (--limit)",
 )
 
 # Allocation of tolerances.
-NOT_MET = _rejects(
+NOT_MET = rejects(
     "allocation-not-met",
     ResponseStatus.ALLOCATION,
     "No tolerances were found with which the limit is kept.",
     "allow a larger probability (--target), or move the limit",
 )
-TIGHT = _rejects(
+TIGHT = rejects(
     "allocation-too-tight",
     ResponseStatus.ALLOCATION,
     "The allocated tolerances keep the limit with a probability far below the target: wider ones may do.",
 )
-UNCONFIRMED = _rejects(
+UNCONFIRMED = rejects(
     "allocation-unconfirmed",
     ResponseStatus.ALLOCATION,
     "The probability with the allocated tolerances is in doubt.",

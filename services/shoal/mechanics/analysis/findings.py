@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from enum import StrEnum
 
-from shoal.findings import Finding, Kind, Severity, worst_implied
+from shoal.findings import Finding, cautions, notes, rejects, worst_implied
 
 
 class EquilibriumStatus(StrEnum):
@@ -24,69 +24,62 @@ def status_of(findings: Iterable[Finding]) -> EquilibriumStatus:
     return worst_implied(findings, EquilibriumStatus)
 
 
-def _rejects(code: str, status: EquilibriumStatus, meaning: str, remedy: str = "") -> Kind:
-    return Kind(code, Severity.REJECTION, meaning, remedy, status)
-
-
 _HOLD = "add what holds it: a joint, a spring, or gravity"
 
-JOINTS_OPEN = _rejects(
+JOINTS_OPEN = rejects(
     "joints-open",
     EquilibriumStatus.FAILED,
     "The joints cannot be closed.",
     "state a start near a position in which the machine can be assembled",
 )
-NOT_AT_REST = _rejects(
+NOT_AT_REST = rejects(
     "not-at-rest",
     EquilibriumStatus.FAILED,
     "The search ended before the machine was at rest.",
     "start nearer to the equilibrium",
 )
-NO_MESH = _rejects(
+NO_MESH = rejects(
     "no-mesh-within-tolerance",
     EquilibriumStatus.FAILED,
     "No mesh that was tried has an error within the tolerance.",
     "state a larger tolerance",
 )
-UNBALANCED = _rejects(
+UNBALANCED = rejects(
     "forces-unbalanced", EquilibriumStatus.FAILED, "The search converged, but the forces do not balance."
 )
-FALLS = _rejects("falls-without-end", EquilibriumStatus.UNHELD, "Nothing stops the machine from falling.", _HOLD)
-WINDS_UP = _rejects("turns-without-end", EquilibriumStatus.UNHELD, "Nothing stops a body from turning.", _HOLD)
-RESTLESS = _rejects(
+FALLS = rejects("falls-without-end", EquilibriumStatus.UNHELD, "Nothing stops the machine from falling.", _HOLD)
+WINDS_UP = rejects("turns-without-end", EquilibriumStatus.UNHELD, "Nothing stops a body from turning.", _HOLD)
+RESTLESS = rejects(
     "state-does-not-rest",
     EquilibriumStatus.RESTLESS,
     "A state goes on changing where the machine rests, as an integrator does with an error left.",
     "let the machine reach what the controller wants: check limits, the reference and what holds the machine",
 )
-LOOSE = _rejects(
+LOOSE = rejects(
     "nothing-holds",
     EquilibriumStatus.UNHELD,
     "The stiffness of some displacement vanishes: the machine may rest in other positions as well.",
     _HOLD,
 )
-INDETERMINATE = _rejects(
+INDETERMINATE = rejects(
     "stability-indeterminate",
     EquilibriumStatus.UNTOLD,
     "The stiffness of some displacement is below the round-off of the others.",
 )
-GROWS = _rejects(
+GROWS = rejects(
     "follower-forces-drive",
     EquilibriumStatus.UNSTABLE,
     "Forces that follow the motion make a small motion grow, or flutter.",
 )
-UNSTABLE = _rejects(
+UNSTABLE = rejects(
     "unstable", EquilibriumStatus.UNSTABLE, "The forces balance, and a small displacement grows.", "allow it to leave"
 )
-SNAPPED = Kind("snapped", Severity.NOTE, "The machine snapped through or buckled while the loads were applied.")
-STICKS = Kind(
+SNAPPED = notes("snapped", "The machine snapped through or buckled while the loads were applied.")
+STICKS = notes(
     "held-by-friction",
-    Severity.NOTE,
     "Dry friction holds the machine where it starts; the share is that of the limit which it takes at most.",
 )
-LEFT_UNSTABLE = Kind("unstable-left", Severity.NOTE, "An unstable equilibrium was met first, and left.")
-FREE_SPIN = Kind("free-to-spin", Severity.NOTE, "A body may spin about its own axis, which moves nothing.")
-NEGLECTED = Kind(
-    "effect-neglected", Severity.CAUTION, "An effect of the scene is not part of statics: dry friction, driven motion."
-)
-SHEAR = Kind("with-shear", Severity.NOTE, "Rods with shear deformation took the place of slender ones.")
+LEFT_UNSTABLE = notes("unstable-left", "An unstable equilibrium was met first, and left.")
+FREE_SPIN = notes("free-to-spin", "A body may spin about its own axis, which moves nothing.")
+NEGLECTED = cautions("effect-neglected", "An effect of the scene is not part of statics: dry friction, driven motion.")
+SHEAR = notes("with-shear", "Rods with shear deformation took the place of slender ones.")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from enum import StrEnum
 
-from shoal.findings import Finding, Kind, Severity, worst_implied
+from shoal.findings import Finding, cautions, notes, rejects, worst_implied
 
 
 class ModesStatus(StrEnum):
@@ -26,65 +26,53 @@ def status_of(findings: Iterable[Finding]) -> ModesStatus:
     return worst_implied(findings, ModesStatus)
 
 
-def _rejects(code: str, status: ModesStatus, meaning: str, remedy: str = "") -> Kind:
-    return Kind(code, Severity.REJECTION, meaning, remedy, status)
-
-
-UNBALANCED = _rejects(
-    "state-unbalanced", ModesStatus.UNBALANCED, "The forces do not balance in the state of the modes."
-)
-MOVING = _rejects(
+UNBALANCED = rejects("state-unbalanced", ModesStatus.UNBALANCED, "The forces do not balance in the state of the modes.")
+MOVING = rejects(
     "motion-left-out",
     ModesStatus.MOVING,
     "The start moves, and not steadily: the modes are those at rest.",
     "take those at rest as the answer by --speeds 0",
 )
-NO_STEADY_MOTION = _rejects(
+NO_STEADY_MOTION = rejects(
     "no-steady-motion",
     ModesStatus.MOVING,
     "At a speed there is no steady motion, and there are no modes.",
 )
-GROWS = _rejects("mode-grows", ModesStatus.UNSTABLE, "A small motion grows.")
-INDETERMINATE = _rejects(
+GROWS = rejects("mode-grows", ModesStatus.UNSTABLE, "A small motion grows.")
+INDETERMINATE = rejects(
     "mode-indeterminate", ModesStatus.UNTOLD, "The restoring force of a mode is below the round-off of the others."
 )
-COARSE = _rejects(
+COARSE = rejects(
     "mode-mesh-coarse",
     ModesStatus.COARSE,
     "The error of the mesh is more than half of an eigenvalue.",
     "take more elements or a smaller --count",
 )
-BEYOND_THEORY = _rejects(
+BEYOND_THEORY = rejects(
     "mode-beyond-theory",
     ModesStatus.BEYOND_THEORY,
     "What slender rods leave out, shear and rotary inertia, is more than half of an eigenvalue.",
     "take simo-reissner rods or a smaller --count",
 )
-STEADY_MOTION = Kind("about-steady-motion", Severity.NOTE, "The modes are about a steady motion, and which.")
-ELSEWHERE = Kind("steady-elsewhere", Severity.NOTE, "The steady motion is not where the start states it, but near.")
-TURNING_FRAME = Kind("turning-frame", Severity.NOTE, "Some frequencies are those in the turning frame.")
-ABOUT_DOUBTED = Kind(
-    "equilibrium-doubted", Severity.CAUTION, "The equilibrium that the modes are about is not stable or not unique."
-)
-FRICTION_LEFT_OUT = Kind("friction-left-out", Severity.CAUTION, "Dry friction is not part of small motions.")
-UNSTABLE_POLE = Kind("unstable-pole", Severity.CAUTION, "A pole of a linear model grows: the machine leaves its rest.")
-LOOP_UNSTABLE = _rejects("loop-unstable", ModesStatus.UNSTABLE, "The closed loop is not stable: there are no margins.")
-NOT_MET = _rejects(
+STEADY_MOTION = notes("about-steady-motion", "The modes are about a steady motion, and which.")
+ELSEWHERE = notes("steady-elsewhere", "The steady motion is not where the start states it, but near.")
+TURNING_FRAME = notes("turning-frame", "Some frequencies are those in the turning frame.")
+ABOUT_DOUBTED = cautions("equilibrium-doubted", "The equilibrium that the modes are about is not stable or not unique.")
+FRICTION_LEFT_OUT = cautions("friction-left-out", "Dry friction is not part of small motions.")
+UNSTABLE_POLE = cautions("unstable-pole", "A pole of a linear model grows: the machine leaves its rest.")
+LOOP_UNSTABLE = rejects("loop-unstable", ModesStatus.UNSTABLE, "The closed loop is not stable: there are no margins.")
+NOT_MET = rejects(
     "margin-below", ModesStatus.VIOLATED, "A margin of the loop is not as required.", "change the gains of the loop"
 )
-ON_A_KINK = Kind(
-    "on-a-kink", Severity.CAUTION, "A signal of a linear model is where its derivative jumps; one side is taken."
+ON_A_KINK = cautions("on-a-kink", "A signal of a linear model is where its derivative jumps; one side is taken.")
+BY_DIFFERENCES = notes(
+    "by-differences", "A linear model about a state that moves or is not in balance is of differences."
 )
-BY_DIFFERENCES = Kind(
-    "by-differences", Severity.NOTE, "A linear model about a state that moves or is not in balance is of differences."
-)
-DIFFERENCES_PART = _rejects(
+DIFFERENCES_PART = rejects(
     "differences-disagree",
     ModesStatus.UNTOLD,
     "Differences of two steps disagree: the machine has no linear model there, as at a kink or a jump.",
 )
-FRICTION_SMOOTHED = Kind(
-    "friction-as-slope", Severity.CAUTION, "Dry friction is in a linear model by the slope of its smoothed law."
-)
-LOWEST_MODES = Kind("lowest-modes", Severity.NOTE, "A linear model is of the lowest modes of a large machine.")
-GROWS_AT = Kind("grows-at-speeds", Severity.NOTE, "At some speeds of the diagram a small motion grows.")
+FRICTION_SMOOTHED = cautions("friction-as-slope", "Dry friction is in a linear model by the slope of its smoothed law.")
+LOWEST_MODES = notes("lowest-modes", "A linear model is of the lowest modes of a large machine.")
+GROWS_AT = notes("grows-at-speeds", "At some speeds of the diagram a small motion grows.")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import StrEnum
 
-from shoal.findings import Kind, Severity
+from shoal.findings import cautions, rejects
 
 
 class ReactionsStatus(StrEnum):
@@ -16,35 +16,30 @@ class ReactionsStatus(StrEnum):
     IMPACT = "impact"
 
 
-UNBALANCED = Kind(
+UNBALANCED = rejects(
     "bodies-unbalanced",
-    Severity.REJECTION,
+    ReactionsStatus.UNBALANCED,
     "No forces in the joints balance the bodies.",
-    implies=ReactionsStatus.UNBALANCED,
 )
-IMPACT = Kind(
+IMPACT = rejects(
     "impact-at-this-time",
-    Severity.REJECTION,
+    ReactionsStatus.IMPACT,
     "An impact is at this instant: there are impulses, and no forces.",
     "ask for a time before or after it",
-    ReactionsStatus.IMPACT,
 )
-INACCURATE = Kind(
+INACCURATE = rejects(
     "forces-inaccurate",
-    Severity.REJECTION,
+    ReactionsStatus.INACCURATE,
     "The forces depend on the steps: no two runs with other steps agree within a twentieth of the largest force.",
     "use a smaller solver.step, or solver.integrator=dop853 with a smaller solver.relative_tolerance, or earlier times "
     "if the motion is chaotic",
-    ReactionsStatus.INACCURATE,
 )
-NOT_ESTIMATED = Kind(
+NOT_ESTIMATED = rejects(
     "force-error-not-estimated",
-    Severity.REJECTION,
+    ReactionsStatus.INACCURATE,
     "No other run could be made that shows the errors of the forces.",
-    implies=ReactionsStatus.INACCURATE,
 )
-OTHER_RUN = Kind(
+OTHER_RUN = cautions(
     "forces-of-careful-run",
-    Severity.CAUTION,
     "The run as stated is too far off; the forces are those of more careful runs, which agree.",
 )
