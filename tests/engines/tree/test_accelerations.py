@@ -7,10 +7,10 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
+from dense_equations import accelerations, equations
 from scipy.spatial.transform import Rotation
 from shoal.engines.tree.articulated import accelerate
 from shoal.engines.tree.motion import energies
-from shoal.engines.tree.recursive import accelerations, equations
 from shoal.engines.tree.tree import COORDINATES, PRISMATIC, RATES, REVOLUTE, SPHERICAL, room
 
 MIXES = ("revolute", "prismatic", "spherical", "fixed", "mixed", "mixed-again")

@@ -1,7 +1,7 @@
 """Outward pass: poses, velocities and velocity-dependent accelerations of all bodies, equation (2), and energies.
 
 S_j = T_j S_i + D_j qdot_j with S = [omega; v] of the body's origin in the axes of the fixed frame;
-see `recursive` for the matrices. Here each body takes a constant number of operations.
+the tests compare it with dense matrices. Here each body takes a constant number of operations.
 """
 
 from __future__ import annotations

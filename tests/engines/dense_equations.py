@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial.transform import Rotation
-
 from shoal.engines.tree.tree import PRISMATIC, RATES, REVOLUTE, SPHERICAL, Array, Tree
 
 
