@@ -1,4 +1,4 @@
-"""What became of a run, once its true error is known: the classes of the stability maps and of the nightly report."""
+"""Classes of runs by their true error, of the stability maps and of the nightly report."""
 
 from __future__ import annotations
 

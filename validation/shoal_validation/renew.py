@@ -114,7 +114,7 @@ def _renew(name: str, study: Study, data: Path | None) -> None:
 
 
 def main(arguments: list[str]) -> None:
-    """Renew what is asked for."""
+    """Renew the chosen studies."""
     parser = argparse.ArgumentParser(prog="python -m shoal_validation.renew", description=__doc__)
     parser.add_argument("--list", action="store_true", help="print the studies and what they took, and run none")
     parser.add_argument("--only", nargs="+", choices=STUDIES, default=list(STUDIES), metavar="NAME")

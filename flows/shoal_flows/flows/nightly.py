@@ -33,7 +33,7 @@ class Validated:
         return self.night.passed
 
     def doubts(self) -> list[str]:
-        """What is not."""
+        """Every reason not to trust the night."""
         return [line.complaint for line in self.night.lines if not line.verdict.fine]
 
     def to_json(self) -> dict[str, Any]:

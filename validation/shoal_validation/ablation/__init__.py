@@ -1,1 +1,1 @@
-"""Which part of the improved fish swarm earns its cost: every part on and off, with and without the others."""
+"""Ablation of the improved fish swarm: every part on and off, with and without the others."""

@@ -82,7 +82,7 @@ def _plain(result: Any) -> dict[str, Any]:
 
 
 def _arrays(row: dict[str, Any], seeds: int) -> dict[str, Any]:
-    """What `_plain` flattened, (2, 2, 2, 2, seeds) again."""
+    """Arrays that `_plain` flattened, (2, 2, 2, 2, seeds) again."""
     return {
         name: np.reshape(value, (2, 2, 2, 2, seeds)) if isinstance(value, list) else value
         for name, value in row.items()

@@ -23,7 +23,7 @@ FARTHEST = -2.0
 
 @dataclass(frozen=True)
 class Panel:
-    """What one column shows: values by swarm, (2, 2, 2, 2, seeds), and the words around them."""
+    """Column of a chart: values by swarm, (2, 2, 2, 2, seeds), and the words around them."""
 
     values: dict[str, Array]
     title: str

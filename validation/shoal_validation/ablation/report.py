@@ -1,4 +1,4 @@
-"""What the ablations say: pictures and Markdown tables from the measured arrays."""
+"""Report of the ablations: pictures and Markdown tables from the measured arrays."""
 
 from __future__ import annotations
 

@@ -151,7 +151,7 @@ def passage(
 
 
 def verdict(run: Trajectory, off: float) -> str:
-    """What became of a passage that ended so far [m] from where projection leads."""
+    """Class of a passage by its distance [m] at the end from that of projection."""
     if not np.all(np.isfinite(run.points)):
         return "diverged"
     if max(np.max(np.abs(np.sin(run.angle(f"coupler{k}")))) for k in range(1, LOOPS + 1)) > TURNED:
@@ -170,7 +170,7 @@ def _moving(integrator: str, step: float, duration: float) -> Scene:
 
 @cache
 def _projected(integrator: str, step: float, duration: float) -> Array:
-    """Where the crank ends by projection with removal of drift [m], (2,)."""
+    """End of the crank by projection with removal of drift [m], (2,)."""
     end: Array = simulate(_moving(integrator, step, duration), np.array([duration])).marker("B0")[-1]
     return end
 

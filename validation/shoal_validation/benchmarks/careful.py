@@ -84,7 +84,7 @@ class Kept:
         return np.asarray(mbs.GetSensorStoredData(self._tip)[1:, 1:3])
 
     def _coordinates(self, angles: Array) -> Array:
-        """Of straight rods: place and slope of every node."""
+        """Place and slope of every node of straight rods."""
         nodes, base = [], np.zeros(2)
         for rod, angle in zip(self._rods, angles, strict=True):
             along = np.array([np.cos(angle), np.sin(angle)])

@@ -1,4 +1,4 @@
-"""A chain of rigid bodies in space beside MuJoCo and Exudyn, and how the cost grows with the number of bodies.
+"""A chain of rigid bodies in space beside MuJoCo and Exudyn, and the growth of the cost with the number of bodies.
 
 Every figure is the median time of one step on one core in one process, over a run of many steps from the
 same state: a chain that hangs in revolute joints about alternating axes, from a gently curved start at rest.

@@ -1,4 +1,4 @@
-"""What an identification costs: ours beside scipy around CasADi and around Exudyn, on the paper's two cases.
+"""Cost of an identification: ours beside scipy around CasADi and around Exudyn, on the paper's two cases.
 
 `python -m shoal_validation.benchmarks.identification`. All are given the same data, fit the same mesh, each with the
 longest of its own steps that tell the angles to `careful.ACCURACY`, and start where the first samples put the machine.
@@ -120,7 +120,7 @@ def _theirs(found: careful.Found, measurement: Measurement) -> Answer:
 
 
 def _start(problem: Problem, measurement: Measurement) -> Array:
-    """Of the poses that the first samples allow, the one that is near the truth."""
+    """Pose near the truth, of those that the first samples allow."""
     starts = starting_points(ForwardModel(problem, problem.load_scene(), get_engine("gauss"), measurement))
     away = np.abs(starts - np.array(list(measurement.truth.values())))
     return np.asarray(starts[int(np.argmin(np.max(away, axis=1)))])

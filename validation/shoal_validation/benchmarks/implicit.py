@@ -48,7 +48,7 @@ class StiffRow(NamedTuple):
 
 
 class GrowthRow(NamedTuple):
-    """An integrator on so many elements: evaluations a step, seconds per element and step."""
+    """An integrator on a number of elements: evaluations a step, seconds per element and step."""
 
     integrator: str
     elements: int

@@ -1,4 +1,4 @@
-"""What a service costs: the overhead of a call, a crowd of clients, and its memory over many requests.
+"""Cost of a service: the overhead of a call, a crowd of clients, and its memory over many requests.
 
     python -m shoal_validation.benchmarks.service [--calls 300] [--clients 64] [--requests 10000]
 

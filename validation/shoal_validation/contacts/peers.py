@@ -41,7 +41,7 @@ def ours(case: Case, **solver: Any) -> Run:
 
 
 def exudyn(case: Case, count: int, stiff: float) -> Run:
-    """Run Exudyn for so many steps, with springs that a step of `stiff` times theirs would have."""
+    """Run Exudyn for a number of steps, with springs that a step of `stiff` times theirs would have."""
     exu, engine, step = exudyn_library(), ExudynEngine(), case.time / count
     scene = Scene.parse({**case.data, "solver": {"duration": case.time, "step": step * stiff}})
     machine = engine.machine(exu, scene)

@@ -1,1 +1,1 @@
-"""How often the 95 % intervals of an identification contain the truth."""
+"""Coverage of the 95 % intervals of an identification."""

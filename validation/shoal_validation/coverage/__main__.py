@@ -26,7 +26,7 @@ from shoal_validation.document import publish, table
 
 @dataclass(frozen=True)
 class Count:
-    """Of one parameter: share of intervals with the truth, spread of the estimates and the mean reported one."""
+    """One parameter: share of intervals with the truth, spread of the estimates and the mean reported one."""
 
     parameter: str
     covered: float
@@ -36,7 +36,7 @@ class Count:
 
 
 def measure(case: Case, seeds: int) -> list[Count]:
-    """Refit to so many data sets. naive: coverage of 1.96 standard deviations of a plain least-squares covariance."""
+    """Refit to `seeds` data sets. naive: coverage of 1.96 standard deviations of a plain least-squares covariance."""
     console = Console(stderr=True)
     found = np.array([_refit(case, s) for s in track(range(seeds), case.name, console=console, transient=True)])
     errors, halves, stds, plain = np.moveaxis(found, -1, 0)

@@ -21,7 +21,7 @@ NOISE = 5e-3
 
 @dataclass(frozen=True)
 class Case:
-    """What is sought, its true values, and the correlation of neighbouring samples of the noise."""
+    """Sought parameters, their true values, and the correlation of neighbouring samples of the noise."""
 
     name: str
     problem: Problem

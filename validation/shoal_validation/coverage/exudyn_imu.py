@@ -1,4 +1,4 @@
-"""What an IMU shows by Exudyn's own outputs of acceleration and rate, where Shoal's mechanics compute nothing."""
+"""IMU by Exudyn's own outputs of acceleration and rate, where Shoal's mechanics compute nothing."""
 
 from __future__ import annotations
 

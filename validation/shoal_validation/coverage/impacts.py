@@ -92,7 +92,7 @@ STUDIED = ("rod", "disc")
 
 @dataclass(frozen=True)
 class Trial:
-    """What came out of a seed. errors: of each parameter that is called right, over the side of its interval."""
+    """Result of a seed. errors: of each parameter that is called right, over the side of its interval."""
 
     verdict: str
     message: str

@@ -30,7 +30,7 @@ WANTED = 500
 
 @dataclass(frozen=True)
 class Count:
-    """Of one posterior. covered: whether it holds the truth, by parameter; worth: effective draws.
+    """Coverage of one posterior. covered: whether it holds the truth, by parameter; worth: effective draws.
 
     seconds: of processors, the fit included
     """

@@ -25,12 +25,12 @@ class Machine:
 
     @cached_property
     def scene(self) -> Scene:
-        """As a scene."""
+        """Return the machine as a scene."""
         return Scene.parse(self.data, self.data["name"])
 
     @property
     def truth(self) -> dict[str, float]:
-        """The true values of what is sought."""
+        """True values of the sought parameters."""
         return {name: float(self.scene.value(path)) for name, path in self.sought.items()}
 
 

@@ -37,7 +37,7 @@ WRONG = 2.0
 
 @dataclass(frozen=True)
 class Trial:
-    """What came out for a machine. verdict, message: as told, or the kind of error and what it says.
+    """Result for a machine. verdict, message: as reported, or the kind of error and its text.
 
     errors: of each parameter that is called right, over the side of its interval where the truth is
     """

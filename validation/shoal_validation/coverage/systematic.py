@@ -39,7 +39,7 @@ _CONDITION = 1e5
 
 
 def model_of(rng: np.random.Generator) -> ForwardModel:
-    """A machine with what is sought of it, on the record of itself."""
+    """A machine with its sought parameters, on the record of itself."""
     data, sought, seen = MACHINES[int(rng.integers(len(MACHINES)))](rng)
     scene = Scene.parse(data, "machine")
     count = int(rng.choice([60, 200, 600]))

@@ -74,7 +74,7 @@ def floor(runs: list[Run]) -> float:
 
 
 def headline(runs: list[Run]) -> str:
-    """Who reaches the truth with the fewest evaluations, and who does not."""
+    """Methods that reach the truth, by evaluations, and those that do not."""
     won = {name: cheapest for name in _methods(runs) if np.isfinite(cheapest := reach(runs, name, "evaluations"))}
     if not won:
         return f"None of {len(_methods(runs))} methods arrives"

@@ -1,4 +1,4 @@
-"""Who takes part: every identification method of Shoal, and the global optimisers that others publish.
+"""Contenders: every identification method of Shoal, and the global optimisers that others publish.
 
 All are given the same bounds and the same counted model. Settings are those the packages come with, but for the ones
 named here. A method of Shoal takes part as soon as it is in METHODS.

@@ -75,7 +75,7 @@ class Cell:
 
     @property
     def panel(self) -> Panel:
-        """Where it belongs."""
+        """Panel of the map that shows the cell."""
         return Panel(self.method, self.stated, self.rate)
 
 

@@ -42,7 +42,7 @@ class Run:
 
     @property
     def error(self) -> float:
-        """Of the best point at the end [rad]; infinite where there is none."""
+        """Error of the best point at the end [rad]; infinite where there is none."""
         return float(self.errors[-1]) if len(self.errors) else float("inf")
 
     @property

@@ -102,7 +102,7 @@ def hilbert_parts(times: Array, signal: Array) -> Array:
 
 
 def local_mean_parts(times: Array, signal: Array) -> Array:
-    """Products of an envelope and a frequency-modulated signal, and what is left as the slow part of the last."""
+    """Products of an envelope and a frequency-modulated signal, and the remainder as the slow part of the last."""
     found, rest = [], signal - signal.mean()
     for _ in range(PARTS):
         envelope, modulated = np.ones(len(times)), rest.copy()

@@ -78,7 +78,7 @@ def _poll(study: Study, searches: Searches, most: int) -> None:
     star = np.vstack([-np.eye(parameters), np.eye(parameters)])
     wanted = np.vstack([np.clip(centre + arm * star, -1, 1) for centre, arm, _ in stars])
     runs(wanted[: most - runs.evaluations])
-    tops = np.vstack([_tops(study, searches, *one) for one in stars])
+    tops = np.vstack([_tops(study, *one) for one in stars])
     runs(tops[: max(0, most - runs.evaluations)])
     xi, goals = runs.xi, _goals(runs.values)
     size = np.tile(study.widths(runs.values), 2)
@@ -119,7 +119,7 @@ def _stars(searches: Searches) -> list[tuple[Array, float, Array]]:
     return found
 
 
-def _tops(study: Study, searches: Searches, centre: Array, arm: float, served: Array) -> Array:
+def _tops(study: Study, centre: Array, arm: float, served: Array) -> Array:
     """Return the tops of the parabolas along the axes, for the goals that are served: at most a few places."""
     xi, parameters = study.runs.xi, len(study.inputs)
     near = np.abs(xi - centre).max(axis=1) <= 2 * arm

@@ -1,4 +1,4 @@
-"""What is not as in the night before, in words."""
+"""Changes since the night before, in words."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def changes(night: Night, nights: Sequence[Night]) -> tuple[str, ...]:
 
 
 def _machines(night: Night, last: Night) -> Iterator[str]:
-    """Which problems and versions of machines are other ones; those of nights of another kind do not compare."""
+    """Problems and versions of machines that changed; those of nights of another kind do not compare."""
     if (night.quick, night.only) != (last.quick, last.only):
         return
     now, then = ({line.problem: line.version for line in one.lines} for one in (night, last))

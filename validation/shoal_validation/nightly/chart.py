@@ -43,7 +43,7 @@ def trend(
             f'<polyline points="{line}" fill="none" stroke="{BLUE}" stroke-width="1.5"/>',
             *(f'<circle cx="{a:.1f}" cy="{b:.1f}" r="3" fill="{BLUE}"/>' for a, b in known),
             *(_cross(x(night)) for night, value in enumerate(values) if value is None),
-            *_ends(x(0), x(len(values) - 1), days),
+            *_ends(x(0), days),
             "</svg>",
         ]
     )
@@ -86,7 +86,7 @@ def _cross(x: float) -> str:
     return f'<path d="M{x - 4:.1f} {TOP - 2}l8 8m0 -8l-8 8" stroke="{VERMILION}" stroke-width="2" fill="none"/>'
 
 
-def _ends(first: float, last: float, days: Sequence[str]) -> list[str]:
+def _ends(first: float, days: Sequence[str]) -> list[str]:
     """The names of the first and the last night."""
     at = HEIGHT - 6
     if len(days) == 1:

@@ -24,7 +24,7 @@ LESS_ACCURATE = 3.0
 
 
 def folder() -> Path:
-    """Where nights and page lie, made on demand. Raises InputError."""
+    """Folder of nights and page, made on demand. Raises InputError."""
     found = home() / "validation"
     found.mkdir(exist_ok=True)
     return found
@@ -71,7 +71,7 @@ def track(key: tuple[str, str, str], nights: Iterable[Night]) -> list[Result]:
 
 
 def since_last(line: Line, points: Sequence[float], nights: Sequence[Night]) -> float:
-    """How far a motion went from that of the last night with the same version of its scene [m]; 0 where there is none.
+    """Distance of a motion from that of the last night with the same version of its scene [m]; 0 where there is none.
 
     points: of its markers, by instants and markers, x and y next to each other
     """

@@ -34,5 +34,5 @@ class Line:
     as_before: bool = False
 
     def reference(self) -> str:
-        """Who says what is right."""
+        """Source of the reference."""
         return self.source or PROBLEMS[self.problem].reference.source

@@ -27,7 +27,7 @@ def lines() -> Iterator[Line]:
 
 
 def silently_wrong(name: str) -> Measured:
-    """How many cells of a map are, as the error; failed if none holds, as such a map guards nothing."""
+    """Number of cells of a map that are, as the error; failed if none holds, as such a map guards nothing."""
     whole = MAPS[name].reduced()
     asked = replace(whole, methods=tuple(method for method in whole.methods if method.ours))
 

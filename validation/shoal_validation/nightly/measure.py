@@ -1,4 +1,4 @@
-"""What one line of the plan computes, in the worker process: an error against the reference, and a time."""
+"""Computation of one line of the plan, in the worker process: an error against the reference, and a time."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ FLEXIBLE_PROBLEMS = ("flexible-case-1", "flexible-case-2", "flexible-hanging")
 
 @dataclass(frozen=True, kw_only=True)
 class Method:
-    """How a problem is run.
+    """Method by which a problem is run.
 
     limits: largest error [m] by problem, None where no answer is expected; problems without one are left out
     reason: what the limit stems from; values: fields of the scene; verify: with estimated errors, as by default;
@@ -63,7 +63,7 @@ def integrator(name: str, **settings: object) -> dict[str, object]:
 
 
 def mesh(element: str, elements: tuple[int, int], **fields: object) -> dict[str, object]:
-    """Fields of the scene that put so many elements on both rods."""
+    """Fields of the scene that put a number of elements on both rods."""
     rods = zip(("OA", "AB"), elements, strict=True)
     return {
         f"bodies.{rod}.{key}": value

@@ -1,4 +1,4 @@
-"""The lines of one's own machines: every scene of the library that says what it expects (`expect:`)."""
+"""Lines of the user's machines: every scene of the library that states its expectations (`expect:`)."""
 
 from __future__ import annotations
 

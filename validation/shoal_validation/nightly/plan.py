@@ -1,4 +1,4 @@
-"""What a night runs: each problem on each engine by several methods, with the error that each may have, and why."""
+"""Plan of a night: each problem on each engine by several methods, with the error that each may have, and why."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a night finds, and its form on disk."""
+"""Result of a night, and its form on disk."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Verdict(StrEnum):
 
     @property
     def fine(self) -> bool:
-        """Return whether nobody needs to look."""
+        """Return whether no one needs to look."""
         return self in (Verdict.PASSED, Verdict.NOT_POSSIBLE)
 
 

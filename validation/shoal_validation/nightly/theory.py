@@ -1,4 +1,4 @@
-"""What the tolerance of an adaptive integrator may cost, by theory: where its steps land, round-off decides.
+"""Error of an adaptive integrator by its tolerance, by theory: where its steps land, round-off decides.
 
 Near a singular position the accelerations carry round-off by `eps / d^2` (docs/method.md). A method of fixed steps
 meets the same distances `d` on every processor; an adaptive one does not, and only its tolerance bounds what that does.
@@ -16,7 +16,7 @@ STEPS_PER_RADIAN = 10.0
 
 @dataclass(frozen=True)
 class Motion:
-    """What the reference's own equation says of a problem's motion.
+    """Motion of a problem by the reference's own equation.
 
     reach: largest distance of the marker that a radian moves [m]; rate: fastest rate of an angle [rad/s];
     growth: largest change of an angle at any later time over a change at the start, of an angle or of a rate in

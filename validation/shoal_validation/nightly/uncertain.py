@@ -1,4 +1,4 @@
-"""The lines of uncertain machines: whether outer bounds that are told enclose what closed forms do."""
+"""Lines of uncertain machines: whether reported outer bounds enclose those of closed forms."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def lines() -> Iterator[Line]:
 
 
 def mapped() -> Measured:
-    """How far true bounds lie beyond outer ones within the horizon told, by more than the gap told."""
+    """Excess of true bounds over outer ones within the reported horizon, beyond the reported gap."""
     from shoal_validation.uncertain.maps import surveyed
 
     seconds, cells = timed(lambda: surveyed([METHOD], quick=True))

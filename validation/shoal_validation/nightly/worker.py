@@ -37,7 +37,7 @@ class Worker:
         self._stop()
 
     def measure(self, run: Callable[[], Measured], timeout: float) -> Measured:
-        """What the run gives within so many seconds; `crashed` or `timeout` otherwise."""
+        """Return the result of the run within a limit of seconds; `crashed` or `timeout` otherwise."""
         pipe, process = self._ready()
         try:
             pipe.send(run)

@@ -1,4 +1,4 @@
-"""`python -m shoal_validation.problems [NAME ...]`: computes the references of flexible problems anew.
+"""`python -m shoal_validation.problems [NAME ...]`: recomputes the references of flexible problems.
 
 Each takes about a minute; the files are part of the sources.
 """

@@ -1,4 +1,4 @@
-"""What a problem of the library states: a scene, its sampling instants, and a reference that others computed."""
+"""Problem of the library: a scene, its sampling instants, and a reference that others computed."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from shoal.trajectory import Array, Trajectory
 
 @dataclass(frozen=True)
 class Reference:
-    """Where the watched marker is at the problem's times.
+    """Positions of the watched marker at the problem's times.
 
     points: [m], (times, d); source: who computed or published it, and how; error: its own error [m], as far as its
     source tells.

@@ -274,7 +274,7 @@ class NewtonEuler:
         return found
 
     def run(self, times: Array, most: int) -> Array:
-        """Return coordinates at times [s], (times, bodies, 3), until so many impacts have been: later ones are nan."""
+        """Return coordinates at times [s], (times, bodies, 3), until a number of impacts: later ones are nan."""
         t, out = 0.0, np.full((len(times), len(self.names), 3), np.nan)
         n = len(self.q)
         touching = {k for k in range(len(self.contacts)) if self.surfaces(k, self.q)[0] < 1e-9}

@@ -31,7 +31,7 @@ def _turn(rng: Random) -> Rotation:
 
 
 def _inertia(rng: Random, size: float) -> Array:
-    """Of twenty points of a body of a size [m] and 1 kg."""
+    """Inertia [kg m^2] of twenty points of a body of a size [m] and 1 kg, (3, 3)."""
     points = size * rng.normal(size=(20, 3)) * rng.uniform(0.3, 1.0, 3) / 2
     points = _turn(rng).apply(points - points.mean(axis=0))
     matrix = np.mean(np.sum(points**2, axis=1)) * np.eye(3) - points.T @ points / 20

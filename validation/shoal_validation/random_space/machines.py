@@ -49,7 +49,7 @@ def machine(seed: int) -> Scene:
     elif rng.random() < 0.5 and not bends:
         initial["B0"]["spin"] = rng.normal(scale=3.0, size=3).tolist() if joints["J0"]["kind"] == "spherical" else None
     initial = {name: {key: x for key, x in one.items() if x is not None} for name, one in initial.items()}
-    return _scene(seed, bodies, joints, initial, _loads(rng, list(bodies), before))
+    return _scene(seed, bodies, joints, initial, _loads(rng, before))
 
 
 def with_directors(scene: Scene) -> Scene:
@@ -73,7 +73,7 @@ def bent(seed: int) -> Scene:
         joints[f"J{k}"] = _joint(rng, kind, before, {"body": name})
         initial[name] = {"rotation": turn.as_rotvec().tolist()}
         before = {"body": name, "point": "end"}
-    return _scene(seed, bodies, joints, initial, _loads(rng, list(bodies), before))
+    return _scene(seed, bodies, joints, initial, _loads(rng, before))
 
 
 def frame(seed: int) -> Scene:
@@ -97,7 +97,7 @@ def frame(seed: int) -> Scene:
         }
         initial[name] = {"rotation": turn.as_rotvec().tolist()}
         before = {"body": name, "point": "end"}
-    return _scene(seed, bodies, joints, initial, _loads(rng, list(bodies), before))
+    return _scene(seed, bodies, joints, initial, _loads(rng, before))
 
 
 def _strip(rng: Random) -> tuple[dict[str, Any], Any]:
@@ -154,7 +154,7 @@ def _joint(rng: Random, kind: str, first: Any, second: Any, *, point: bool = Fal
     return joint
 
 
-def _loads(rng: Random, names: list[str], end: dict[str, Any]) -> dict[str, Any]:
+def _loads(rng: Random, end: dict[str, Any]) -> dict[str, Any]:
     """Springs and forces, or none."""
     loads: dict[str, Any] = {}
     if rng.random() < 0.4:
@@ -187,7 +187,7 @@ def _tilted_linkage(seed: int, rng: Random) -> Scene:
         joints[f"J{k}"] = {"first": first, "second": {"body": f"B{k}"}, "axis": axis}
     base = {"body": "ground", "point": turn.apply(corners[-1]).tolist()}
     joints["end"] = {"first": base, "second": {"body": "B2", "point": "end"}, "axis": axis}
-    return _scene(seed, bodies, joints, initial, _loads(rng, list(bodies), {"body": "B1", "point": "end"}))
+    return _scene(seed, bodies, joints, initial, _loads(rng, {"body": "B1", "point": "end"}))
 
 
 def _scene(seed: int, bodies: Any, joints: Any, initial: Any, loads: Any) -> Scene:

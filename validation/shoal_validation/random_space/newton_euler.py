@@ -42,7 +42,7 @@ class _Vector:
 
 
 class NewtonEuler:
-    """A rigid machine of rigid bodies and point masses, told by the mapping of its scene; poses must be stated."""
+    """A rigid machine of rigid bodies and point masses, from the mapping of its scene; poses must be stated."""
 
     def __init__(self, data: dict[str, Any]) -> None:
         self.data = {"joints": {}, "loads": {}, **data}
@@ -80,7 +80,7 @@ class NewtonEuler:
         raise ArithmeticError(f"no motion from {now:g} s on")
 
     def drift(self) -> float:
-        """How far the stated start is from closing its joints."""
+        """Constraint violation of the stated start."""
         q = self.begin
         rows = [value for value, *_ in self._conditions(q, np.zeros(6 * len(self.names)))]
         return float(np.max(np.abs(rows), initial=0.0))

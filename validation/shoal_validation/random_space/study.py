@@ -33,7 +33,7 @@ MESHES = 16, 32
 
 @dataclass(frozen=True)
 class Judged:
-    """What was said of a machine, and whether it is so.
+    """Verdict on a machine, and whether it is right.
 
     verdict: right, wrong and called right, refused, not met (no answer at all), or not judged; judge: its name
     """
@@ -49,7 +49,7 @@ class Judged:
 
 @dataclass(frozen=True)
 class _Opinion:
-    """Of a judge: its motion or why it has none, and how far it may be off itself, as a part of the scale and in m."""
+    """Answer of a reference: its motion or why it has none, and its own error, as a part of the scale and in m."""
 
     judge: str
     motion: Trajectory | Mapping[str, Any] | str
@@ -58,7 +58,7 @@ class _Opinion:
 
     @property
     def silence(self) -> str:
-        """Why there is nothing to go by; empty if there is."""
+        """Reason for a missing motion; empty if there is one."""
         if isinstance(self.motion, str):
             return self.motion
         bad = isinstance(self.motion, Trajectory) and not self.motion.ok
@@ -99,7 +99,7 @@ def judged(seed: int, kind: str = "chains") -> Judged:
 
 
 def drawn(seed: int, kind: str) -> tuple[str, Scene]:
-    """What a machine is called where that says something, and the machine."""
+    """Name of a machine where it has one, and the machine."""
     if kind == "linkages":
         name, data = linkages.drawn(seed)
         return f"{name}: ", Scene.parse(data)
@@ -147,7 +147,7 @@ def _by_engines(scene: Scene) -> _Opinion:
 
 
 def _divided(scene: Scene, count: int) -> Scene:
-    """The scene with so many elements of every flexible rod."""
+    """Scene with a number of elements of every flexible rod."""
     return scene.with_values({f"bodies.{name}.elements": count for name in scene.flexible_rods})
 
 
@@ -177,7 +177,7 @@ def _by_beams(scene: Scene) -> _Opinion:
 
 
 def _exudyn(scene: Scene, cables: Mapping[str, int]) -> Trajectory | str:
-    """Exudyn with so many cables for these rods, and the others as they are stated."""
+    """Exudyn with a number of cables for these rods, and the others as stated."""
     values: dict[str, object] = {}
     for rod, count in cables.items():
         values |= {f"bodies.{rod}.element": "ancf-cable", f"bodies.{rod}.elements": count}

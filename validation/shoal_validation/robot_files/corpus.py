@@ -48,7 +48,7 @@ def _contents(git: Path, wanted: list[tuple[str, str]]) -> Iterator[tuple[str, b
 
 
 def choose(folder: Path, count: int, kind: str) -> list[Path]:
-    """Return so many files of a kind, urdf or mjcf, in turn from each repository, by digest of their paths."""
+    """Return `count` files of a kind, urdf or mjcf, in turn from each repository, by digest of their paths."""
     is_machine: Callable[[Path], bool] = {"urdf": _is_urdf, "mjcf": _is_mjcf}[kind]
     groups: dict[str, list[Path]] = {}
     seen = set[bytes]()

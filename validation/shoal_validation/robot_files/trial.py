@@ -148,7 +148,7 @@ def reference(path: Path, scene: dict[str, Any]) -> tuple[Any, str]:
 
 
 def _changes(line: str) -> bool:
-    """Return whether what is left out changes the motion that is compared."""
+    """Return whether an omitted part changes the motion that is compared."""
     words = ("damping", "its spring", "its armature", "the medium", "gravity compensation", "frictionloss", "cubic")
     tendon = line.startswith("tendon") and "armature" not in line
     return any(word in line for word in words) and not tendon and not line.startswith("<")

@@ -74,7 +74,7 @@ def load(record: Path) -> list[Case]:
 
 
 def cases_of(seeds: Sequence[int], patience: float = PATIENCE) -> Iterator[Case]:
-    """What the machines of these seeds show, with progress on standard error."""
+    """Yield the cases of the machines of these seeds, with progress on standard error."""
     for seed in track(seeds, "machines", console=Console(stderr=True)):
         machine = draw(seed)
         with np.errstate(invalid="ignore"):

@@ -11,7 +11,7 @@ from shoal_validation.selection.study import Case
 
 
 def section(cases: Sequence[Case]) -> str:
-    """What became of all machines, by number of rods."""
+    """Results of all machines, by number of rods."""
     rows = [_row(f"{rods}", [case for case in cases if case.rods == rods]) for rods in (1, 2, 3, 4)]
     head = (
         *("rods", "machines", "met, and true", "met, not true", "beyond 3 times", "met, truth unknown"),

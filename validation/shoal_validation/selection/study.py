@@ -25,7 +25,7 @@ AFFORDABLE = 3e8
 
 @dataclass(frozen=True)
 class Case:
-    """What one machine showed.
+    """Result for one machine.
 
     stiffness: geometric mean of the rods' moduli [Pa]; rigid: whether all rods came out rigid;
     error: true distance from the reference of the finer selection [m], nan if there is none; work: of the chosen model;

@@ -64,7 +64,7 @@ def main() -> None:
 
 
 def table(results: Sequence[Result]) -> Table:
-    """How many cells of each class every method has over all maps, silently wrong first."""
+    """Table of the cells of each class by method over all maps, silently wrong first."""
     counts: dict[str, Counter[Outcome]] = {}
     for result in results:
         for panel in result.panels:

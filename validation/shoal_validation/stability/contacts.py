@@ -41,7 +41,7 @@ def rod(stop: float, kept: float, duration: float = 5.0) -> Watched:
 
 @cache
 def swung(stop: float, kept: float, count: int) -> Array:
-    """Where the end of the rod is [m], (times, 2)."""
+    """Positions of the end of the rod [m], (times, 2)."""
     angles = np.array([struck(stop, kept, TOP, float(time)) for time in TIMES[:count]]) - np.pi / 2
     return np.stack([np.cos(angles), np.sin(angles)], axis=1)
 
@@ -62,7 +62,7 @@ def disc(mu: float, kept: float, spin: float = THROWN[1]) -> Watched:
 
 @cache
 def bounced(mu: float, kept: float, spin: float, times: bytes) -> Array:
-    """Where the centre of the disc is [m], (times, 2)."""
+    """Positions of the centre of the disc [m], (times, 2)."""
     return np.array([_bounced(mu, kept, spin, float(time)) for time in np.frombuffer(times)])
 
 
@@ -98,7 +98,7 @@ def _rubbed(u: float, w: float, most: float) -> tuple[float, float]:
 
 
 def many(count: int) -> Watched:
-    """The worst of so many balls beside each other: that with the largest restitution."""
+    """The worst of several balls beside each other: that with the largest restitution."""
     whole = balls(2.0).data
     names = [f"ball{k}" for k in range(count)]
     kept = {name: float(e) for name, e in zip(names, np.linspace(0.5, 0.9, count), strict=True)}

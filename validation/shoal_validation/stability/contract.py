@@ -1,4 +1,4 @@
-"""What a stability map is: a machine, two axes, methods, and for every cell what became of the run."""
+"""Stability map: a machine, two axes, methods, and the class of the run in every cell."""
 
 from __future__ import annotations
 
@@ -166,7 +166,7 @@ def checked(run: Trajectory, scene: Scene) -> Trajectory:
 
 
 def said(run: Trajectory) -> Status:
-    """What the engine itself said of a run: that it failed, or nothing, with numbers that are none in plain sight."""
+    """Message of the engine on a run: that it failed, or none, where its numbers are plainly not finite."""
     if run.status[0] is Status.FAILED:
         return Status.FAILED
     return Status.OK if np.all(np.isfinite(run.points)) else Status.DIVERGED
@@ -189,5 +189,5 @@ class Panel:
 
     @property
     def count(self) -> Counter[Outcome]:
-        """How many cells are of each class."""
+        """Number of cells of each class."""
         return Counter(cell.outcome for cell in self.cells)

@@ -1,4 +1,4 @@
-"""Exudyn as its own user meets it: default settings of the integrator, adaptive step included, nobody looks again."""
+"""Exudyn with the default settings of its integrator, adaptive step included, and no second run."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class ExudynDefaults:
 
     @property
     def capabilities(self) -> Capabilities:
-        """What it can simulate."""
+        """Return the capabilities of Exudyn."""
         return ExudynEngine().capabilities
 
     def simulate(self, scene: Scene, times: Sequence[float] | Array | None = None) -> Trajectory:

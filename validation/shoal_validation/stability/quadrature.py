@@ -1,4 +1,4 @@
-"""Element and quadrature against the mesh, each by an adaptive integrator: what is left is the error of the mesh.
+"""Element and quadrature against the mesh, each by an adaptive integrator: the remaining error is that of the mesh.
 
 The reference is Exudyn's cable element with reduced quadrature on 16/32 elements by its trapezoidal rule,
 step 2e-4 s: a beam without shear. Elements with shear (`solid`) cannot reach it where the rods are thick.

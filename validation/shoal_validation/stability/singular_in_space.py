@@ -154,7 +154,7 @@ def linkage(first: float) -> dict[str, Any]:
 
 
 def folding(angle: float) -> Callable[[Any], Any]:
-    """Without gravity the energy alone tells the rate; derivatives of the closure by complex steps."""
+    """Without gravity the rate follows from the energy alone; derivatives of the closure by complex steps."""
 
     def inertia(first: float) -> float:
         return float(sum(np.sum((place.imag / 1e-20) ** 2) for place in masses(first + 1e-20j)))

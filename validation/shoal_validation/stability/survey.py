@@ -64,7 +64,7 @@ class Result:
 
 
 def _brief(cell: Cell) -> dict[str, Any]:
-    """What is kept of a cell: its class and the evidence, to three digits; settings where it is silently wrong."""
+    """Record of a cell: its class and the evidence, to three digits; settings where it is silently wrong."""
     evidence: dict[str, Any] = {"outcome": str(cell.outcome), "status": cell.status, "steps": cell.steps}
     for name in ("error", "energy_drift", "constraint_drift"):
         evidence[name] = float(f"{getattr(cell, name):.3g}")
@@ -78,7 +78,7 @@ def _brief(cell: Cell) -> dict[str, Any]:
 
 
 def survey(asked: StabilityMap, note: Callable[[str], None] = lambda _: None) -> Result:
-    """Run every cell of a map; `note` is told of each finished panel."""
+    """Run every cell of a map; `note` is called for each finished panel."""
     panels = []
     for method in asked.methods:
         cells = tuple(asked.cell(method, x, y) for y in asked.y.values for x in asked.x.values)

@@ -1,1 +1,1 @@
-"""Whether an identification names what is wrong with a model, and leaves right ones alone."""
+"""Study of fault hypotheses: wrong models whose cause is named, and right ones that are left alone."""

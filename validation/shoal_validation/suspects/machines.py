@@ -45,7 +45,7 @@ def pendulum(rng: np.random.Generator) -> tuple[dict[str, Any], list[str], list[
 
 
 def double_pendulum(rng: np.random.Generator) -> tuple[dict[str, Any], list[str], list[tuple[str, str]]]:
-    """As `pendulum`."""
+    """Like `pendulum`, with another machine."""
     scene = {
         "name": "double-pendulum",
         "bodies": {"OA": rod(rng, 0.5, 1.2), "AB": rod(rng, 0.5, 1.2)},
@@ -64,7 +64,7 @@ def double_pendulum(rng: np.random.Generator) -> tuple[dict[str, Any], list[str]
 
 
 def four_bar(rng: np.random.Generator) -> tuple[dict[str, Any], list[str], list[tuple[str, str]]]:
-    """As `pendulum`; a crank that falls, its coupler and rocker."""
+    """Like `pendulum`: a crank that falls, its coupler and rocker."""
     crank, rocker = rod(rng, 0.3, 0.5), rod(rng, 0.6, 0.9)
     angle, base = float(rng.uniform(0.5, 1.2)), float(rng.uniform(0.9, 1.1))
     elbow = crank["length"] * np.exp(1j * angle)

@@ -39,7 +39,7 @@ FEW = 3
 
 
 def main(arguments: list[str]) -> bool:
-    """Measure, print, write; whether nothing is wrong in silence where `auto` told it."""
+    """Measure, print, write; return whether nothing is silently wrong by `auto`."""
     parser = argparse.ArgumentParser(prog="python -m shoal_validation.uncertain", description=__doc__)
     parser.add_argument("--studies", type=int, default=200)
     parser.add_argument("--first", type=int, default=0, help="seed of the first study")
@@ -88,7 +88,7 @@ def compared(*, quick: bool) -> list[Line]:
 
 
 def tried(count: int, runs: int, most: int | None = None, first: int = 0, record: Path | None = None) -> list[Judged]:
-    """So many random studies against so many runs each; most: parameters. One that fails is printed."""
+    """Try `count` random studies against `runs` runs each; most: parameters. One that fails is printed."""
     every = (drawn(seed) for seed in itertools.count(first))
     asked = itertools.islice((one for one in every if most is None or len(one.varied) <= most), count)
     cases = {f"seed {one.seed}, {runs} runs": one for one in asked}

@@ -68,7 +68,7 @@ def _panel(place: Axes, methods: list[str], columns: list[Question], found: dict
 
 
 def findings(cells: Sequence[Cell]) -> str:
-    """A row for each method: in how many cells it is right to the end, refuses or cannot tell, or is wrong in silence,
+    """A row for each method: the cells where it is right to the end, refuses or is undecided, or silently wrong,
     and the median horizon.
     """
     rows = []

@@ -37,7 +37,7 @@ class Repeated:
 
     @property
     def within(self) -> float:
-        """Share of the repetitions that tell the probability within ten per cent."""
+        """Share of the repetitions with the probability within ten per cent."""
         return float(np.mean(np.abs(self.ratios - 1) < 0.1))
 
 
@@ -92,7 +92,7 @@ def two(one: float, other: float) -> tuple[Function, float]:
 
 
 def sphere(exact: float, about: int) -> tuple[Function, float]:
-    """About the origin, in the first so many parameters: passed in all directions alike, as by a kinetic energy."""
+    """Limit about the origin in the first `about` parameters, in all directions alike, as of a kinetic energy."""
     square = float(stats.chi2.isf(exact, about))
     return lambda x: square - (x[:, :about] ** 2).sum(axis=1), exact
 

@@ -1,4 +1,4 @@
-"""How far ahead each method tells bounds: by the number of parameters, the width of their intervals, and chaos.
+"""Horizon of the bounds of each method: by the number of parameters, the width of their intervals, and chaos.
 
 A sum of vibrations in closed form, the mean of cos(2 pi f sqrt(k) g(t)), one for each parameter k, with frequencies f
 that share no period. Without chaos g is the time t in cycles of the first, so that phases part in proportion to it;
@@ -60,7 +60,7 @@ class Question:
         return times if self.rate == 0 else np.asarray(np.expm1(self.rate * times) / self.rate)
 
     def at(self, instants: Array) -> Model:
-        """As a model."""
+        """Return the study as a model."""
 
         def model(values: Mapping[str, Array]) -> Answers:
             pace = np.stack([_frequency(n) * np.sqrt(k)[:, None] for n, k in enumerate(values.values())])
@@ -83,13 +83,13 @@ class Question:
 
 
 def _frequency(number: int) -> float:
-    """Of a vibration, in those of the first."""
+    """Frequency of a vibration, over that of the first."""
     return math.sqrt(1 + 0.6 * number)
 
 
 @dataclass(frozen=True)
 class Cell:
-    """What a method finds. runs: made; horizon: cycles up to which attained bounds are right and it does not refuse;
+    """Result of a method. runs: made; horizon: cycles up to which attained bounds are right and it does not refuse;
     told: whether it tells outer bounds; beyond: how far true bounds lie beyond these where they are told, as a share of
     the width, more than the gap told
     """
@@ -103,7 +103,7 @@ class Cell:
 
     @property
     def silent(self) -> bool:
-        """Return whether outer bounds are wrong and nothing tells."""
+        """Return whether outer bounds are wrong without a finding."""
         return self.beyond > OFF
 
 

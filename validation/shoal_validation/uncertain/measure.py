@@ -20,7 +20,7 @@ ROUNDING = 1e-5
 
 @dataclass(frozen=True)
 class Line:
-    """What a method found.
+    """Result of a method.
 
     runs: made; short: how far attained bounds stay inside the true ones, as a share of the width; verdict: `holds` (the
     outer bounds enclose, up to the gap told), `silent` (they do not, and nothing tells), `horizon` (some instants are

@@ -38,7 +38,7 @@ class Form:
 
 @dataclass(frozen=True)
 class Met:
-    """Errors of mean and deviation as shares of the deviation, and what was told of them."""
+    """True and reported errors of mean and deviation as shares of the deviation."""
 
     form: Form
     runs: int
@@ -48,7 +48,7 @@ class Met:
 
     @property
     def kept(self) -> tuple[bool, bool]:
-        """Return whether the error told is not smaller than the true one."""
+        """Return whether the reported error is not smaller than the true one."""
         return tuple(true <= told + 1e-7 for true, told in zip(self.errors, self.told, strict=True))  # type: ignore[return-value]
 
 
@@ -104,7 +104,7 @@ def _shape(random: np.random.Generator, size: float) -> tuple[str, Function]:
 
 
 def _ridge(seed: int, random: np.random.Generator, count: int) -> Form:
-    """Of one direction of normal variables."""
+    """Function of one direction of normal variables."""
     way = random.normal(size=count) if random.random() < 0.5 else np.ones(count)
     way /= np.linalg.norm(way)
     name, of = _shape(random, float(np.exp(random.uniform(np.log(0.1), np.log(0.9)))))

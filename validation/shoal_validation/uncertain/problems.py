@@ -21,7 +21,7 @@ GRID = {1: 200_001, 2: 801}
 
 @dataclass(frozen=True)
 class Problem:
-    """A motion over so many parameters, asked for at these instants [s].
+    """A motion over `parameters` parameters at these instants [s].
 
     separable: a sum of functions of one parameter each, so that bounds are sums of theirs; continuous: a motion, not a
     map of single instants
@@ -42,7 +42,7 @@ class Problem:
         )
 
     def at(self, instants: Array) -> Model:
-        """As a model."""
+        """Return the problem as a model."""
 
         def model(values: Mapping[str, Array]) -> Answers:
             u = np.stack([values[f"u{k}"] for k in range(self.parameters)], axis=1)[:, :, None]

@@ -1,4 +1,4 @@
-"""What uncertain responses must reach: by how many runs, how accurately. One row for each demand."""
+"""Demands on uncertain responses: numbers of runs and accuracy. One row for each demand."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def double_pendulum(count: int) -> Iterator[Reached]:
 
 
 def computing() -> Reached:
-    """What four intervals cost a processor, over all threads; kernels are compiled by then."""
+    """Processor time of four intervals, over all threads; kernels are compiled before."""
     ways, times = dict(list(FIELDS.items())[:4]), list[float]()
     for _ in range(REPEATS):
         begin = time.process_time()
@@ -309,7 +309,7 @@ def _indices(name: str, answer: ModelResponse, exact: Array) -> Reached:
 
 
 def probabilities() -> Iterator[Reached]:
-    """Of limits in closed form, each many times."""
+    """Probabilities of limits in closed form, each many times."""
     for state in STATES:
         found = repeated(state, "auto", REPETITIONS)
         yield Reached(

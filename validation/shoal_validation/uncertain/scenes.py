@@ -254,14 +254,14 @@ class Tried:
 
     @property
     def kept(self) -> bool:
-        """Return whether no run lies further out than the gap told."""
+        """Return whether no run lies further out than the reported gap."""
         assert self.response.bounds is not None
         gap = self.response.bounds.gap
         return math.isnan(gap) or self.beyond <= gap + ROUNDING
 
 
 def tried(asked: Asked, runs: int, seed: int = 1) -> Tried:
-    """One study, and so many runs against it."""
+    """One study, and `runs` runs against it."""
     found = uncertain(asked.machine, dict(asked.vary), asked.times, verify=False)
     bounds = found.bounds
     assert bounds is not None
@@ -277,7 +277,7 @@ def tried(asked: Asked, runs: int, seed: int = 1) -> Tried:
 
 
 def attempted(asked: Asked, runs: int, seed: int) -> tuple[Array, Array, int]:
-    """The extremes of so many runs, (columns,) each, and how many of them failed."""
+    """Extremes of `count` runs, (columns,) each, and the number of those that failed."""
     random, scene, engine = np.random.default_rng(seed), asked.machine, get_engine("gauss")
     ends = np.array(list(asked.vary.values()))
     count, times = len(ends), np.array(asked.times)

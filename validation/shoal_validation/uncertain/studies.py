@@ -50,7 +50,7 @@ class Drawn:
 
     @property
     def signals(self) -> int:
-        """Of the machine."""
+        """Number of signals of the machine."""
         return len(self.kind.motion(np.array(self.kind.fields)[:, None, None], self.times[:1]))
 
     @property
@@ -74,7 +74,7 @@ class Drawn:
         return np.moveaxis(found, 0, 2).reshape(count, -1)
 
     def at(self, times: Array) -> Model:
-        """As a model."""
+        """Return the study as a model."""
 
         def model(values: Mapping[str, Array]) -> Answers:
             found = self.motion(values, times)
@@ -121,12 +121,12 @@ class Judged:
 
     @property
     def kept(self) -> bool:
-        """Return whether no run lies further out than the gap told, and every bound is attained."""
+        """Return whether no run lies further out than the reported gap, and every bound is attained."""
         return math.isnan(self.gap) or (self.beyond <= self.gap + ROUNDING and self.broken <= ROUNDING)
 
 
 def judged(asked: Drawn, runs: int = RUNS) -> Judged:
-    """The study by `auto`, and so many random runs against it."""
+    """The study by `auto`, and `runs` random runs against it."""
     return against(asked, answered(asked), runs)
 
 
@@ -146,7 +146,7 @@ def answered(asked: Drawn) -> ModelResponse:
 
 
 def against(asked: Drawn, answer: ModelResponse, runs: int) -> Judged:
-    """So many random runs against an answer."""
+    """Random runs against an answer."""
     signals = asked.signals
     bounds, times = answer.bounds, asked.times
     assert bounds is not None
@@ -180,7 +180,7 @@ def against(asked: Drawn, answer: ModelResponse, runs: int) -> Judged:
 
 
 def attempted(asked: Drawn, runs: int) -> tuple[Array, Array]:
-    """The extremes of so many random runs, (columns,): in the box, on its faces, and about the best ones so far."""
+    """Extremes of random runs, (columns,): in the box, on its faces, and about the best ones so far."""
     random = np.random.default_rng((asked.seed, 7))
     inputs = asked.inputs
     low = high = asked.motion(inputs.values(np.zeros((1, len(inputs)))), asked.times)[0]

@@ -77,7 +77,7 @@ def _asked() -> argparse.Namespace:
 
 
 def _problems(only: str | None, page: str | None) -> dict[str, list[Problem]]:
-    """What is measured, by pages."""
+    """Problems to measure, by pages."""
     from shoal_validation.problems import PROBLEMS, get_problem
 
     found: dict[str, list[Problem]] = {}

@@ -1,4 +1,4 @@
-"""What is measured: a method at one setting becomes one point of error and time."""
+"""Measurements: a method at one setting becomes one point of error and time."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ OURS, MANY = "ours", "ours, 64 at once"
 
 @dataclass(frozen=True)
 class Run:
-    """What one call gave: path of the watched marker [m], (times, d); its status and what it says for itself.
+    """Result of one call: path of the watched marker [m], (times, d); its status and message.
 
     evaluations: of the accelerations, where the method tells.
     """
@@ -82,7 +82,7 @@ class Point:
 
     @property
     def label(self) -> str:
-        """What it is, in one line."""
+        """Description in one line."""
         return ", ".join(part for part in (self.family, self.method, self.mesh, self.setting) if part)
 
 

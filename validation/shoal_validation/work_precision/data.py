@@ -1,4 +1,4 @@
-"""What a run leaves behind: one JSON file of machine, versions, references and points, which can be drawn again."""
+"""Record of a run: one JSON file of machine, versions, references and points, which can be drawn again."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ NAME = "work-precision"
 
 
 def machine_facts() -> dict[str, str]:
-    """What the times depend on."""
+    """Facts about the machine that the times depend on."""
     return {"processor": processor(), "cores": str(os.cpu_count()), **versions(PACKAGES)}
 
 

@@ -53,7 +53,7 @@ def size(problem: Problem) -> float:
 
 
 def study(problem: Problem, quick: bool = False, note: Callable[[str], None] = lambda _: None) -> Study:
-    """Every family on one problem; `note` is told what is under way."""
+    """Every family on one problem; `note` is called with the measurement under way."""
     brief = quick or problem.name != HEADLINE
     points: list[Point] = []
     left_out: dict[str, str] = {}
@@ -104,7 +104,7 @@ def timed(call: Callable[[], Run], repeats: int = REPEATS) -> tuple[float, Run]:
 
 
 def point(problem: Problem, method: Method, setting: float, seconds: float, run: Run, repeats: int) -> Point:
-    """What a run is worth, once it is known where the marker should have been.
+    """Error of a run against the reference.
 
     One that is off by a tenth of the machine's size is silently wrong and not drawn.
     """
@@ -128,7 +128,7 @@ def point(problem: Problem, method: Method, setting: float, seconds: float, run:
 
 
 def setting_name(method: Method, setting: float) -> str:
-    """How a setting stands in tables, with its unit."""
+    """Text of a setting in tables, with its unit."""
     return f"{method.unit} {setting:.3g}" + (" s" if method.unit == "step" else "")
 
 

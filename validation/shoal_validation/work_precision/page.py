@@ -31,7 +31,7 @@ def tables(studies: list[Study], machine: dict[str, str]) -> str:
 
 
 def references(studies: list[Study]) -> str:
-    """Who computed what every chart is measured against, and how well."""
+    """Sources of the references of every chart, and their accuracy."""
     rows = []
     for study in studies:
         known = study.problem.reference
@@ -55,7 +55,7 @@ def reach(studies: list[Study]) -> str:
 
 
 def further(studies: list[Study]) -> str:
-    """What the same error costs in other ways: many at once, the other families."""
+    """Cost of the same error in other ways: many at once, the other families."""
     rows = []
     for study in studies:
         for line in (line for line in costs(study) if line.many or line.other):
@@ -71,7 +71,7 @@ def fronts(study: Study) -> str:
 
 
 def failures(studies: list[Study]) -> str:
-    """How many runs ended without a number, by method and status; and what was not asked at all."""
+    """Runs that ended without a number, by method and status; and omitted methods."""
     rows = []
     for study in studies:
         for family in dict.fromkeys(p.family for p in study.points):

@@ -1,4 +1,4 @@
-"""What it costs to come within an error: ours beside the cheapest Exudyn setting that does."""
+"""Cost of an error: ours beside the cheapest Exudyn setting that comes within it."""
 
 from __future__ import annotations
 
@@ -31,19 +31,19 @@ class Cost:
 
     @property
     def ratio(self) -> float | None:
-        """How many times longer Exudyn's whole call takes than ours."""
+        """Ratio of the time of Exudyn's whole call to ours."""
         return self.exudyn.seconds / self.ours.seconds if self.ours and self.exudyn else None
 
     @property
     def loop_ratio(self) -> float | None:
-        """How many times longer Exudyn's time loop alone takes than our whole call."""
+        """Ratio of the time of Exudyn's time loop alone to our whole call."""
         if not (self.ours and self.loop and self.loop.loop_seconds):
             return None
         return self.loop.loop_seconds / self.ours.seconds
 
 
 def costs(study: Study) -> list[Cost]:
-    """One line per error that its reference can tell and that is small for the machine."""
+    """One line per error that its reference resolves and that is small for the machine."""
     by = {family: [p for p in study.points if p.family == family] for family in (OURS, MANY, EXUDYN)}
     others = [p for p in study.points if p.family not in by]
     return [

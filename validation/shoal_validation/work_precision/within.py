@@ -1,4 +1,4 @@
-"""What it costs to come within an error, measured again at the settings that the last full run found cheapest.
+"""Cost of an error, measured again at the settings that the last full run found cheapest.
 
 `python -m shoal_validation.work_precision.within` takes a minute where the full run takes a quarter of an hour. It
 reads that run's points (docs/charts, or another folder), and makes for each flexible scene and error three whole calls
