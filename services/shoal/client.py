@@ -29,10 +29,10 @@ from shoal.requests.function import stated
 from shoal.response.read import by_name
 from shoal.scene.load import as_scene
 from shoal.scene.paths import unwrapped
+from shoal.serialization import KIND, unpacked
 from shoal.shelf import NAME
 from shoal.table import ColumnTable, load_table
 from shoal.trajectory import Array
-from shoal.wire import KIND, unpacked
 
 PAUSES = (0.02, 1.0)
 """Between two looks at a job, the shortest and the longest [s]."""

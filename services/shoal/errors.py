@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import errno
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 """No room: on the disk, for this user, in this file."""
@@ -28,6 +30,15 @@ class ComputationError(ShoalError):
     """The computation ran and cannot be trusted, or could not run to its end."""
 
     exit_status = 3
+
+
+@contextmanager
+def needs_extra(extra: str) -> Iterator[None]:
+    """Name the extra of this package that brings a module whose import fails. Raises InputError."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        raise InputError(f"{error.name} is not installed; install shoal with its extra {extra!r}") from None
 
 
 def check_trusted(trusted: bool, reason: str) -> None:

@@ -7,12 +7,12 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from shoal.atomic_write import atomic_write, file_name
 from shoal.engines import get_engine
 from shoal.engines.contract import sampling_times
 from shoal.errors import ComputationError, InputError
 from shoal.scene import Scene
 from shoal.trajectory import Trajectory
-from shoal.whole import file_name, whole
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Exported:
 
     def save(self, file: Path) -> None:
         """Write the file, whole or not at all. Raises ComputationError."""
-        with whole(file) as part:
+        with atomic_write(file) as part:
             part.write_text(self.text, encoding="utf-8")
 
 

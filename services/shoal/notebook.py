@@ -69,7 +69,7 @@ def simulate(asked: Simulate) -> Trajectory:
 
 
 def machine(asked: OfScene, note: Callable[[str], None] = lambda _: None) -> Scene:
-    """Return the scene of a request with its fields set; `note` is told of values that are doubted or left out.
+    """Return the scene of a request with its fields set; `note` is called for values that are doubted or left out.
 
     Raises InputError.
     """
@@ -86,9 +86,9 @@ def machine(asked: OfScene, note: Callable[[str], None] = lambda _: None) -> Sce
 def motion(
     asked: Simulate, scene: Scene, tell: Callable[[str], None] = lambda _: None
 ) -> tuple[Trajectory, Scene, Selection | None]:
-    """Return the motion of a scene, the scene that was simulated, and how its model was chosen for a tolerance.
+    """Return the motion of a scene, the scene that was simulated, and the choice of its model for a tolerance.
 
-    tell: called with what the search for a model does. Raises InputError.
+    tell: called with the steps of the search for a model. Raises InputError.
     """
     from shoal.engines import get_engine
     from shoal.engines.verification import verified
@@ -394,7 +394,7 @@ def design(asked: DesignRequest) -> Design:
 
 
 def designed(asked: DesignRequest, note: Callable[[str], None] = lambda _: None) -> Design:
-    """Return the design of an experiment; `note` is told of values that are doubted or left out.
+    """Return the design of an experiment; `note` is called for values that are doubted or left out.
 
     Raises InputError, ComputationError.
     """

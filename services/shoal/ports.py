@@ -1,4 +1,4 @@
-"""Where engines are served, and whether a server can listen somewhere, asked before it is started."""
+"""Ports at which engines are served, and checks that a server can listen there, before it is started."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The library of one's own as a folder: entries by kind and name, each there as a whole or not at all.
+"""User library as a folder: a versioned file store by kind and name, whose entries are there as a whole or not at all.
 
 KIND/NAME/VERSION/ holds the files of one version, NAME.yaml among them, and never changes; KIND/NAME/current says which
 version the name stands for. What an entry means and whether it is right is no matter here; see `shoal.library`.
@@ -131,7 +131,7 @@ class Shelf:
             os.rename(self.root / kind / name, away)
 
     def hold(self, name: str, files: Files) -> Path:
-        """Keep what a study uses, whatever becomes of the entries it came from; returns the document."""
+        """Keep copies of the entries that a study uses, which outlive these; return the document."""
         check_files(check_name(name), files)
         place = self.root / _HELD / version_of(files)
         if not (place / f"{name}.yaml").exists():
@@ -197,7 +197,7 @@ class Shelf:
                     shutil.rmtree(path)
 
     def identity(self, *, make: bool = False) -> str:
-        """Return the mark that tells this library from any other, by whatever path it is reached, or "" if it has none.
+        """Return the identity of this library, the same by any path, or "" if it has none.
 
         Containers and machines reach one folder by different paths, and different folders by one path. make: give it
         one where there is none and it can be written to.

@@ -230,7 +230,7 @@ def _cells(line: bytes) -> list[str]:
 
 
 def _is_header(cells: Sequence[str], width: int) -> bool:
-    """Return whether cells name so many columns, each by a word of its own."""
+    """Return whether cells name all columns, each by a word of its own."""
     return len(cells) == width == len(set(cells)) and all(cells) and not any(_are_numbers([cell]) for cell in cells)
 
 
@@ -251,7 +251,7 @@ def _refuse_preamble(path: Path, data: bytes, named: bool) -> None:
 
 
 def _separator(line: str) -> str:
-    """What stands between the cells of a line; beside others a comma is a decimal mark."""
+    """Return the delimiter of the cells of a line; beside others a comma is a decimal mark."""
     return next((mark for mark in (";", "\t") if mark in line), ",")
 
 
@@ -314,7 +314,7 @@ def _units(head: _Head) -> _Head:
 
 
 def _header(data: bytes, named: bool) -> _Head:
-    """The header line and what else is above the numbers.
+    """Header line, and other lines above the numbers.
 
     named: whether the columns are named elsewhere; then the first line of data tells how cells are separated. A
     comment that has as many words as the numbers below it is their header, as `numpy.savetxt` writes it; where that is

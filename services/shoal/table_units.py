@@ -57,7 +57,7 @@ _NONE = ("", "-", "–", "none", "n/a", "na")
 
 @dataclass(frozen=True)
 class Units:
-    """What the line `row` of a file says of its columns, by their names; nothing where there is no such line."""
+    """Units that the line `row` of a file states of its columns, by their names; none where there is no such line."""
 
     path: Path
     row: int = 0

@@ -1,4 +1,4 @@
-"""What every engine returns: where the markers went, and the evidence for believing it."""
+"""Result of every engine: trajectories of the markers, and the evidence for believing them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shoal.error_budget import ErrorBudget
-from shoal.errors import InputError
+from shoal.errors import InputError, needs_extra
 from shoal.findings import Concluded, Finding, explained, worst_implied
 from shoal.json_values import plain
 
@@ -24,7 +24,7 @@ Array = npt.NDArray[np.float64]
 
 
 class Status(StrEnum):
-    """How a run ended. Only `ok` may be believed."""
+    """Status of a run at its end. Only `ok` may be believed."""
 
     OK = "ok"
     REFUSED = "refused"
@@ -112,7 +112,7 @@ class Trajectory(Concluded):
 
     @property
     def errors(self) -> ErrorBudget:
-        """What is known of how far the markers are off [m]; empty where it was not estimated."""
+        """Known errors of the markers [m]; empty where they were not estimated."""
         return ErrorBudget.from_json(self.model.get("errors"))
 
     def __repr__(self) -> str:
@@ -124,7 +124,7 @@ class Trajectory(Concluded):
         return "" if self.status[lane] is Status.OK else explained(self.lane_findings[lane])
 
     def changed(self, lane: int = 0) -> Mapping[str, Any]:
-        """What of its stated start a lane does not keep: body -> quantity -> stated, used, unit."""
+        """Values of its stated start that a lane does not keep: body -> quantity -> stated, used, unit."""
         changed: Mapping[str, Any] = self.changes[lane] if self.changes else self.model.get("initial_changes", {})
         return changed
 
@@ -137,7 +137,7 @@ class Trajectory(Concluded):
         return self.angles[:, self._place(name), lane]
 
     def _place(self, name: str) -> int:
-        """Of a marker among the others."""
+        """Return the number of a marker."""
         if name not in self.markers:
             raise InputError(f"marker: no marker {name!r}; there are {', '.join(self.markers)}")
         return self.markers.index(name)
@@ -158,10 +158,8 @@ class Trajectory(Concluded):
 
     def to_xarray(self) -> xr.Dataset:
         """All lanes: x, y [m] and angle [rad] over time [s], marker and lane. Raises InputError without xarray."""
-        try:
+        with needs_extra("notebook"):
             import xarray as xr
-        except ModuleNotFoundError:
-            raise InputError("xarray is not installed; install shoal with its extra 'notebook'") from None
         dims = ("time", "marker", "lane")
         columns = {axis: (self.points[:, :, k], "m") for k, axis in enumerate(self.axes)}
         columns["angle"] = self.angles, "rad"

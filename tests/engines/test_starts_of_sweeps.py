@@ -13,7 +13,7 @@ from shoal.engines.one_by_one import one_by_one
 from shoal.engines.sweep import sweep
 from shoal.pictures import files
 from shoal.scene import Scene
-from shoal.wire import packed, unpacked
+from shoal.serialization import packed, unpacked
 
 ANGLE, CRANK, LINE = 1.2, 0.3, 0.1
 """Stated angle [rad] and length [m] of the crank; height of the slider's line above its hinge [m]."""

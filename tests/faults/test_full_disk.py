@@ -14,9 +14,9 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from shoal.atomic_write import atomic_write
 from shoal.cli import main
 from shoal.errors import ComputationError
-from shoal.whole import whole
 
 # Files may grow to so many bytes, which every process may decide for itself; a full disk says it with another word.
 ROOM = 2000
@@ -61,12 +61,12 @@ def test_a_result_is_written_whole_or_not_at_all(ending: str, tmp_path: Path) ->
 def test_a_name_that_leaves_no_room_for_more_is_a_name(ending: str, tmp_path: Path) -> None:
     """255 bytes; what is written beside it first has a shorter one. One byte more is told."""
     out = tmp_path / f"{'a' * (254 - len(ending))}.{ending}"
-    with whole(out) as part:
+    with atomic_write(out) as part:
         part.write_text("all")
     assert out.read_text() == "all"
     with (
         pytest.raises(ComputationError, match="cannot be written: File name too long"),
-        whole(out.with_stem("a" * 255)),
+        atomic_write(out.with_stem("a" * 255)),
     ):
         pass
     assert [path.name for path in tmp_path.iterdir()] == [out.name]
@@ -78,7 +78,7 @@ def test_a_link_to_itself_is_no_file(tmp_path: Path) -> None:
     ended = CliRunner().invoke(main, ["simulate", "single-pendulum", "--out", str(out)])
     assert (ended.exit_code, ended.stdout) == (2, "")
     assert ended.stderr == f"shoal: out: {out} cannot be written: Too many levels of symbolic links\n"
-    with pytest.raises(ComputationError, match="symbolic links"), whole(out):
+    with pytest.raises(ComputationError, match="symbolic links"), atomic_write(out):
         pass
 
 
@@ -86,7 +86,7 @@ def test_a_pipe_is_written_into_and_stays_one(tmp_path: Path) -> None:
     pipe = tmp_path / "pipe.csv"
     os.mkfifo(pipe)
     reader = subprocess.Popen(["cat", pipe], stdout=subprocess.PIPE)
-    with whole(pipe) as part:
+    with atomic_write(pipe) as part:
         part.write_text("all of it")
     assert reader.communicate(timeout=10)[0] == b"all of it"
     assert stat.S_ISFIFO(pipe.stat().st_mode)
@@ -165,15 +165,15 @@ def test_what_fails_otherwise_leaves_nothing(tmp_path: Path) -> None:
     target = tmp_path / "a.txt"
 
     def fails() -> None:
-        with whole(target) as path:
+        with atomic_write(target) as path:
             path.write_text("half")
             raise ZeroDivisionError
 
     with pytest.raises(ZeroDivisionError):
         fails()
     assert list(tmp_path.iterdir()) == []
-    with pytest.raises(ComputationError, match=r"out: .* cannot be written"), whole(target / "b.txt") as path:
+    with pytest.raises(ComputationError, match=r"out: .* cannot be written"), atomic_write(target / "b.txt") as path:
         path.write_text("x")
-    with whole(target) as path:
+    with atomic_write(target) as path:
         path.write_text("all")
     assert target.read_text() == "all"

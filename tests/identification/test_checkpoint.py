@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from shoal.errors import InputError
+from shoal.evaluation_cache import EvaluationCache
 from shoal.identification import Estimate, Verdict, identify
 from shoal.identification.deadline import TimeIsUp
 from shoal.identification.forward import ForwardModel
-from shoal.memory import Memory
 from shoal_validation.inverse_precision.cases import rigid_problem, textbook
 
 METHOD = "iafsa-unseeded"
@@ -59,11 +59,11 @@ def test_a_killed_run_goes_on_to_the_same_answer(tmp_path: Path) -> None:
 
 
 def test_what_is_known_is_not_computed_again(tmp_path: Path) -> None:
-    memory = Memory(tmp_path / "kept", "one")
+    memory = EvaluationCache(tmp_path / "kept", "one")
     points, residuals = np.array([[1.0, 2.0]]), np.array([[3.0, np.inf]])
     memory.keep(0.5, points, residuals)
     memory.close()
-    again = Memory(tmp_path / "kept", "one")
+    again = EvaluationCache(tmp_path / "kept", "one")
     assert np.array_equal(again.recall(0.5, points), residuals)  # type: ignore[arg-type]
     assert again.recalled == 1
     assert again.recall(0.4, points) is None
@@ -75,29 +75,29 @@ def test_what_is_known_is_not_computed_again(tmp_path: Path) -> None:
 def test_a_cut_off_end_is_dropped(tmp_path: Path, lost: int) -> None:
     """Whatever a crash left unwritten, down to the file's own head, is computed again; the rest is found."""
     path = tmp_path / "kept"
-    memory = Memory(path, "one")
+    memory = EvaluationCache(path, "one")
     batches = [np.full((1, 2), float(k)) for k in range(3)]
     for points in batches:
         memory.keep(0.5, points, points)
     memory.close()
     path.write_bytes(path.read_bytes()[: max(10, path.stat().st_size - lost)])
-    again = Memory(path, "one")
+    again = EvaluationCache(path, "one")
     found = [again.recall(0.5, points) is not None for points in batches]
     assert found == ([True, True, False] if lost < 1000 else [False] * 3)
     again.keep(0.5, batches[2], batches[2])
     again.close()
-    with closing(Memory(path, "one")) as whole:
+    with closing(EvaluationCache(path, "one")) as whole:
         assert whole.recall(0.5, batches[2]) is not None
 
 
 def test_a_foreign_file_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "kept"
-    Memory(path, "one").close()
+    EvaluationCache(path, "one").close()
     with pytest.raises(InputError, match=r"checkpoint: .* another identification"):
-        Memory(path, "other")
+        EvaluationCache(path, "other")
     path.write_text("a,b\n1,2\n")
     with pytest.raises(InputError, match=r"checkpoint: .* another identification"):
-        Memory(path, "one")
+        EvaluationCache(path, "one")
     assert path.read_text() == "a,b\n1,2\n"
 
 
@@ -111,19 +111,19 @@ def test_another_seed_is_another_identification(tmp_path: Path) -> None:
 def test_a_damaged_file_is_refused(tmp_path: Path) -> None:
     """A changed byte in a kept residual would change the answer without a word."""
     path = tmp_path / "kept"
-    memory = Memory(path, "one")
+    memory = EvaluationCache(path, "one")
     memory.keep(0.5, np.zeros((1, 2)), np.ones((1, 50)))
     memory.close()
     data = bytearray(path.read_bytes())
     data[-20] ^= 1
     path.write_bytes(data)
     with pytest.raises(InputError, match=r"checkpoint: .* damaged"):
-        Memory(path, "one")
+        EvaluationCache(path, "one")
 
 
 def test_a_place_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"checkpoint: .* cannot be written"):
-        Memory(tmp_path / "nowhere" / "kept", "one")
+        EvaluationCache(tmp_path / "nowhere" / "kept", "one")
 
 
 def test_a_time_limit_gives_the_best_so_far_and_says_so() -> None:

@@ -47,7 +47,7 @@ Uncertainty = Annotated[tuple[End, End] | Distribution, BeforeValidator(_known)]
 class Request(Asked):
     """Base of all requests. answer: type of the answer; follows: the numbers by which a job reports progress.
 
-    objects: answer the whole object of the library's function, as `shoal.wire` writes it for `shoal.Client`
+    objects: answer the whole object of the library's function, as `shoal.serialization` writes it for `shoal.Client`
     """
 
     answer: ClassVar[Any] = dict[str, Any]
@@ -72,7 +72,7 @@ class Request(Asked):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What whoever asked should know beside the answer."""
+        """Notes on the request, which go with the answer."""
         return tuple(self._notes)
 
     def arguments(self) -> dict[str, Any]:

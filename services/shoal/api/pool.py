@@ -24,7 +24,7 @@ async def _never() -> bool:
 
 
 async def _end_if(gone: Callable[[], Awaitable[bool]], worker: Worker, answer: asyncio.Future[bytes]) -> None:
-    """Kill a worker whose answer nobody waits for."""
+    """Kill a worker whose answer is not awaited any more."""
     while not answer.done():
         await asyncio.sleep(LOOK)
         if await gone() and not answer.done():
@@ -57,7 +57,7 @@ class Pool:
             self._replace()
 
     async def stop(self) -> None:
-        """End every worker, whatever it is doing."""
+        """End every worker, those that compute among them."""
         self._open = False
         for task in list(self._starting):
             task.cancel()
@@ -74,7 +74,7 @@ class Pool:
         started: Callable[[], None] = lambda: None,
         gone: Callable[[], Awaitable[bool]] = _never,
     ) -> bytes:
-        """What the task gives, within so many seconds of computing. Raises Refusal.
+        """Return the result of a task, within a limit of seconds of computing. Raises Refusal.
 
         note: told how it goes; started: called when a worker has been found; gone: whether nobody asks any longer.
         Then, and where this is cancelled, the worker that computes is killed.

@@ -88,7 +88,7 @@ async def version(calls: Calls) -> VersionDocument:
 
 @v1.get("/capabilities", dependencies=[Ready], responses=documented("not-ready"))
 async def capabilities(calls: Calls) -> EngineDocument:
-    """What the engine can simulate."""
+    """Return the capabilities of the engine."""
     return EngineDocument(**calls.about["capabilities"])
 
 
@@ -148,7 +148,7 @@ async def no_operation(operation: JobId) -> None:
 
 @by_id.get("/{id}", responses=documented("not-found", "input"))
 async def status(id: JobId, jobs: AllJobs) -> JobStatus:
-    """How a job goes."""
+    """Return the state of a job."""
     return jobs.get(id).status
 
 
@@ -160,7 +160,7 @@ async def cancel(id: JobId, jobs: AllJobs) -> None:
 
 @by_id.get("/{id}/result", response_model=dict[str, Any], responses=documented("not-found", "conflict", *COMPUTING))
 async def result(id: JobId, jobs: AllJobs) -> Response:
-    """What the operation answers."""
+    """Return the schema of an operation's answer."""
     job = jobs.get(id)
     if job.refusal is not None:
         raise job.refusal

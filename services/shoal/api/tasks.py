@@ -29,8 +29,8 @@ from shoal.mechanics import findings as kinds
 from shoal.mechanics.analysis.joint_reactions import to_json as reactions_to_json
 from shoal.requests.request import read
 from shoal.scene import Scene
+from shoal.serialization import packed
 from shoal.trajectory import Trajectory
-from shoal.wire import packed
 
 Note = Callable[[Any], None]
 """Told how a computation goes."""

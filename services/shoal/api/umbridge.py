@@ -77,7 +77,7 @@ Call = Annotated[ModelCall, Depends(known)]
 
 @router.post("/ModelInfo")
 async def model_info(call: Call) -> dict[str, Any]:
-    """What a model can do."""
+    """Return the capabilities of a model."""
     return {"support": {"Evaluate": True, "Gradient": True, "ApplyJacobian": True, "ApplyHessian": False}}
 
 

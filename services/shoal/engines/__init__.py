@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from shoal.engines.known import ENGINES
-from shoal.errors import InputError
+from shoal.errors import InputError, needs_extra
 
 if TYPE_CHECKING:
     from shoal.engines.contract import Engine
@@ -58,10 +58,8 @@ ENGINES |= {
 
 
 def _remote(url: str) -> Engine:
-    try:
+    with needs_extra("services"):
         from shoal.engines.remote import RemoteEngine
-    except ModuleNotFoundError as error:
-        raise InputError(f"{error.name} is not installed; install shoal with its extra 'services'") from None
     return RemoteEngine(url)
 
 

@@ -1,4 +1,4 @@
-"""Error of contacts that give way, by runs with stiffer ones: what is left of the distance is disagreement.
+"""Error of contacts that give way, by runs with stiffer ones: the remaining distance is disagreement.
 
 A spring that stands for a rigid contact is entered by a depth and for a time that are proportional to stiffness^-1/2.
 Engines with such springs make them as stiff as the step resolves, stiffness ~ step^-2, so that the error is

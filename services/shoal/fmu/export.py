@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from shoal.atomic_write import atomic_write
 from shoal.engines import get_engine
 from shoal.engines.capabilities import is_moved_by_swarm
 from shoal.errors import ComputationError, InputError
@@ -21,7 +22,6 @@ from shoal.fmu.running import CONTENT, Running, identifier
 from shoal.scene import Scene
 from shoal.scene.ended import End
 from shoal.scene.function import Function
-from shoal.whole import whole
 
 SAME_PLACE = 1e-9
 """A unit and `simulate` run the same solver; so far apart [m] they are not the same machine."""
@@ -49,7 +49,7 @@ def export(
         "inputs": {path: number(scene, path) for path in dict.fromkeys(inputs)},
     }
     target = out or Path(f"{identifier(scene)}.fmu")
-    with tempfile.TemporaryDirectory() as folder, _paths_as_they_were(), whole(target) as unit:
+    with tempfile.TemporaryDirectory() as folder, _paths_as_they_were(), atomic_write(target) as unit:
         builder, name = _builder(fmi)
         script, data = Path(folder) / name, Path(folder) / CONTENT
         shutil.copy(str(Path(__file__).with_name(name)), script)

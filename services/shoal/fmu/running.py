@@ -11,11 +11,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from shoal.atomic_write import LONGEST
 from shoal.errors import ComputationError, ShoalError
 from shoal.fmu.ahead import Ahead
 from shoal.identification.recording.units import unit as unit_of
 from shoal.scene import Scene
-from shoal.whole import LONGEST
 
 CONTENT = "scene.json"
 """The file among the unit's resources that holds the scene and the names of its parameters and inputs."""

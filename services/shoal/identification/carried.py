@@ -11,7 +11,7 @@ import numpy as np
 
 from shoal.arguments import told
 from shoal.errors import InputError
-from shoal.estimated import checked_joint, read_estimate
+from shoal.read_estimate import checked_joint, read_estimate
 from shoal.scene import expression
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from shoal.errors import InputError
+from shoal.errors import InputError, needs_extra
 from shoal.findings import Concluded, Finding
 from shoal.identification.diagnostics.hypotheses import Hypothesis
 from shoal.identification.diagnostics.residual_tests import ResidualTests
@@ -40,10 +40,8 @@ def dataset(
     A gap in the data is nan, and so is a quantity that a marker was not measured in. Units are in the attributes; those
     of the parameters, which differ, are a coordinate. Raises InputError.
     """
-    try:
+    with needs_extra("notebook"):
         import xarray as xr
-    except ModuleNotFoundError:
-        raise InputError("xarray is not installed; install shoal with its extra 'notebook'") from None
     return xr.merge([_parameters(parameters, covariance), _signals(recording, predicted)])
 
 

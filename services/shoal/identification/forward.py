@@ -15,6 +15,7 @@ import numpy.typing as npt
 from shoal.engines import get_engine
 from shoal.engines.contract import Engine
 from shoal.errors import InputError
+from shoal.evaluation_cache import EvaluationCache
 from shoal.identification.bounds import Accepted, accepts
 from shoal.identification.deadline import Deadline, TimeIsUp
 from shoal.identification.loss import flatten, steepness
@@ -29,7 +30,6 @@ from shoal.identification.recording.rows import ResidualRows
 from shoal.identification.recording.source import IMPACT
 from shoal.identification.recording.virtual_sensors import engine_options, from_start, with_sensor_markers
 from shoal.mechanics.numerics.tile import WIDE
-from shoal.memory import Memory
 from shoal.scene import Scene
 from shoal.swarm import EvaluationCounter
 from shoal.trajectory import Array, Status, Trajectory
@@ -61,7 +61,7 @@ class ForwardModel:
     engine: Engine
     measurement: Measurement
     deadline: Deadline | None = None
-    memory: Memory | None = None
+    memory: EvaluationCache | None = None
     whole: ForwardModel | None = None
     counter: EvaluationCounter = field(init=False)
     placements: int = field(init=False, default=0)
@@ -198,13 +198,11 @@ class ForwardModel:
         try:
             trajectory = self._run(scene, values, np.array([0.0, max(end, TINY)]), lanes, {})
         except InputError as error:
-            asked = self.whole or self
-            self.refusal = asked.refusal = asked.refusal or str(error)
-            if lanes == 1:
-                return np.full((1, count), np.nan)
-            halves = (slice(0, lanes // 2), slice(lanes // 2, lanes))
-            parts = [({path: x[half] for path, x in values.items()}, clock[half], delay[half]) for half in halves]
-            return np.concatenate([self._heard(scene, v, recording, times, c, d) for v, c, d in parts])
+
+            def again(values: dict[str, Array], clocks: list[Array]) -> Array:
+                return self._heard(scene, values, recording, times, *clocks)
+
+            return self._halved(error, values, [clock, delay], again, np.full((1, count), np.nan))
         if not trajectory.words:
             raise InputError(f"channels: {IMPACT} is known to the engine gauss alone; found {trajectory.engine}")
         found = np.stack([impact_times(letters, place, count, end) for letters in trajectory.words])
@@ -221,15 +219,12 @@ class ForwardModel:
             trajectory = self._run(with_sensor_markers(scene, channels), values, instants, lanes, options)
             seen = observe(trajectory, channels, view, scene, values)
         except InputError as error:
-            asked = self.whole or self
-            self.refusal = asked.refusal = asked.refusal or str(error)
-            nothing = np.full((1, len(times), len(channels)), np.nan)
-            if lanes == 1:
-                return nothing
-            halves = (slice(0, lanes // 2), slice(lanes // 2, lanes))
-            whole = [np.broadcast_to(number, lanes) for number in view]
-            parts = [({path: x[half] for path, x in values.items()}, [x[half] for x in whole]) for half in halves]
-            return np.concatenate([self._simulate(scene, v, times, Camera(*x), name) for v, x in parts])
+
+            def again(values: dict[str, Array], view: list[Array]) -> Array:
+                return self._simulate(scene, values, times, Camera(*view), name)
+
+            of_view = [np.broadcast_to(number, lanes) for number in view]
+            return self._halved(error, values, of_view, again, np.full((1, len(times), len(channels)), np.nan))
         seen = without_turns(seen, channels)[:, len(instants) - len(times) :]
         failed = np.array([status is not Status.OK for status in trajectory.status])
         seen[np.broadcast_to(failed, len(seen))] = np.nan
@@ -237,6 +232,26 @@ class ForwardModel:
             asked = self.whole or self
             self.failure = asked.failure = asked.failure or trajectory.message
         return seen
+
+    def _halved(
+        self,
+        error: InputError,
+        values: dict[str, Array],
+        others: list[Array],
+        again: Callable[[dict[str, Array], list[Array]], Array],
+        nothing: Array,
+    ) -> Array:
+        """Run both halves of the lanes of a refused call again; a single lane that is refused gives `nothing`.
+
+        values, others: of the lanes, those of the scene by path
+        """
+        asked, lanes = self.whole or self, len(others[0])
+        self.refusal = asked.refusal = asked.refusal or str(error)
+        if lanes == 1:
+            return nothing
+        halves = (slice(0, lanes // 2), slice(lanes // 2, lanes))
+        parts = [({path: x[half] for path, x in values.items()}, [x[half] for x in others]) for half in halves]
+        return np.concatenate([again(*part) for part in parts])
 
     def _run(
         self, scene: Scene, values: dict[str, Array], times: Array, lanes: int, options: dict[str, bool]
@@ -351,8 +366,8 @@ class ForwardModel:
             return accepts(scene, {path: value})
         return self._accepted(path, value)
 
-    def can_be(self, point: Array, name: str | None = None) -> bool:
-        """Return whether a point (parameters,) is a scene in a recording (else the first)."""
+    def can_be(self, point: Array, name: str) -> bool:
+        """Return whether a point (parameters,) is a scene in a recording."""
         try:
             self.scene_at(point, name)
         except InputError:

@@ -16,6 +16,7 @@ from shoal.arguments import check
 from shoal.compile import clock
 from shoal.engines import get_engine
 from shoal.errors import InputError
+from shoal.evaluation_cache import EvaluationCache
 from shoal.identification.carried import Carried
 from shoal.identification.conclude import DEFAULTS, Options, conclude
 from shoal.identification.deadline import Deadline, TimeIsUp, unless_late
@@ -29,7 +30,6 @@ from shoal.identification.recording.plausible import check_constant
 from shoal.identification.recording.source import EngineSource
 from shoal.identification.run_method import Watch, assembled, run_method, with_step
 from shoal.identification.uncertainty.posterior import require_sampler
-from shoal.memory import Memory
 from shoal.versions import versions
 
 _WORTH_A_NOTE = 1.0
@@ -95,7 +95,7 @@ def identify(
     if paces:
         model = with_step(model)
     if checkpoint is not None:
-        model.memory = Memory(checkpoint, _fingerprint(model, name, seed, tolerance))
+        model.memory = EvaluationCache(checkpoint, _fingerprint(model, name, seed, tolerance))
     with nullcontext() if model.memory is None else closing(model.memory):
         begin = clock.now()
         model, outcome, stages = run_method(model, search, np.random.default_rng(seed), tolerance, paces, progress)

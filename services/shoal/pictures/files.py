@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from shoal.atomic_write import atomic_write
 from shoal.errors import InputError
 from shoal.json_values import json_text
-from shoal.whole import whole
 
 if TYPE_CHECKING:
     from shoal.engines.compare import Comparison
@@ -37,7 +37,7 @@ Forms = dict[str, Callable[[], str | bytes]]
 def save(path: Path, forms: Forms) -> None:
     """Write a file in the form of its ending, all of it or nothing. Raises ComputationError."""
     content = forms[path.suffix]()
-    with whole(path) as part:
+    with atomic_write(path) as part:
         part.write_bytes(content if isinstance(content, bytes) else content.encode())
 
 

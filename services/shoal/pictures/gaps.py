@@ -11,7 +11,7 @@ from shoal.pictures.instants import curve, time_axis
 from shoal.pictures.style import GREY, LINES, VERMILION, canvas, headline, log_ticks, styled
 from shoal.response import Response
 from shoal.response.enclosure import Bounds
-from shoal.response.probability_boxes import Ends
+from shoal.response.study import Ends
 from shoal.trajectory import Array
 
 LEAST = 1e-12

@@ -1,4 +1,4 @@
-"""What each command is asked: one frozen model a command, from which every way of asking follows.
+"""Requests: one frozen model for each command, from which every way to state it follows.
 
 The fields of a model are the arguments of the function in `import shoal`, the options of the command line, the fields
 of a study's file, of a service's body and of a flow's form. A new option is one line: its type, default and `Option`.

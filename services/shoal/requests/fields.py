@@ -133,7 +133,7 @@ class OfScene:
 
 @dataclass(frozen=True, config=STRICT)
 class OfProblem:
-    """A problem of identification, and fields of its scene to set.
+    """Problem of identification, and fields of its scene to set.
 
     values: what is sought starts from them, what else they hold is set
     """

@@ -1,4 +1,4 @@
-"""What a field of a request says of itself beside its type."""
+"""Documentation and spelling of the fields of requests, beside their types."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ EVERYWHERE: tuple[Front, ...] = (*HERE, "http", "form")
 
 @dataclass(frozen=True)
 class Option:
-    """Documentation of a field, and how it is written.
+    """Documentation of a field, and its spelling.
 
     help: a sentence, with units; metavar: how the command line writes its value; many: whether that takes one entry at
     a time; old: its name until the release before; names: kind of names that it takes (see `shoal.choices`); shown: its

@@ -1,4 +1,4 @@
-"""From what is stated to a request, and to one line that names what is wrong with it."""
+"""Validation of requests: from stated fields to a request, or to one line that names the wrong field."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def offered(request: Any, front: Front) -> dict[str, Field]:
 
 
 def renamed(request: Any, given: Mapping[str, Any], say: Callable[[str], None]) -> dict[str, Any]:
-    """Return what is given under the names of today; `say` is told of every name of the release before.
+    """Return what is given under the names of today; `say` is called for every name of the release before.
 
     Raises InputError.
     """

@@ -1,4 +1,4 @@
-"""How values are written on the command line and in the files of studies. Raises ValueError."""
+"""Texts of values on the command line and in the files of studies. Raises ValueError."""
 
 from __future__ import annotations
 

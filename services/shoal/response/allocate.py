@@ -141,7 +141,7 @@ def of_random(
     widest: Array,
     **how: Any,
 ) -> Allocation:
-    """Allocate tolerances so that the limit is exceeded with a probability of at most `target`, whatever the intervals.
+    """Allocate tolerances so that the limit is exceeded with a probability of at most `target` at all interval values.
 
     stated: what is known of the limit with the stated tolerances; widest: factors; how: of `between`. Raises
     InputError, ComputationError.

@@ -3,8 +3,8 @@
 Each place is the one at which the fit knows least, which makes the determinant of the fit grow most (sequential
 D-optimal design: Wynn, The sequential generation of D-optimum experimental designs, Annals of Mathematical Statistics
 41, 1970). Of many parameters, elementary effects at the ends of a star choose those with products (Morris, Factorial
-sampling plans for preliminary computational experiments, Technometrics 33, 1991); what is left out is part of the error
-of the polynomial at runs that it has not seen, in which all parameters vary.
+sampling plans for preliminary computational experiments, Technometrics 33, 1991); omitted products are part of the
+error of the polynomial at runs that it has not seen, in which all parameters vary.
 """
 
 from __future__ import annotations

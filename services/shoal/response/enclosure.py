@@ -24,7 +24,7 @@ from shoal.response.expansion import Expansion
 from shoal.response.extremes import Extremes, Surrogate, extremes, in_parts, places
 from shoal.response.inputs import BoolArray, IntArray
 from shoal.response.runs import TooManyRunsError
-from shoal.response.study import FINE_GAP, SAFETY, DatedEnclosure, Enclosure, Found, Study
+from shoal.response.study import FINE_GAP, SAFETY, DatedEnclosure, Enclosure, Ends, Found, Study, share_of
 from shoal.trajectory import Array
 
 CONTROLS = 64
@@ -35,7 +35,7 @@ UNSEEN = 0.05
 
 
 def unseen(count: int) -> float:
-    """The share of the box that so many runs all over it miss with a probability of 5 %: about 3 / count.
+    """Share of the box that `count` runs all over it miss with a probability of 5 %: about 3 / count.
 
     With independent runs (1 - share)^count = 0.05; evenly spread ones see a part that hangs together sooner.
     """
@@ -63,12 +63,8 @@ def with_controls(study: Study, enclosed: DatedEnclosure | None) -> DatedEnclosu
     """Bounds with runs that they predicted."""
     if enclosed is None:
         return None
-    values, now = study.runs.values, enclosed.enclosure
-    lower, upper = values.min(axis=0), values.max(axis=0)
-    low, high = np.minimum(now.lower_outer, lower), np.maximum(now.upper_outer, upper)
-    width, beyond = study.widths(values), np.maximum(lower - low, high - upper)
-    gap = np.divide(beyond, width, out=np.zeros_like(beyond), where=width > 0)
-    return DatedEnclosure(study.runs.evaluations, Enclosure(lower, upper, low, high, gap))
+    outer = enclosed.enclosure.lower_outer, enclosed.enclosure.upper_outer
+    return DatedEnclosure(study.runs.evaluations, Enclosure.of(study, *outer))
 
 
 Look = Literal["there", "scanned", "everywhere"]
@@ -84,15 +80,8 @@ def enclosure(
     """error: of the surrogate at runs that it had not seen, (columns,); found: its extremes; look: where the margin is
     evaluated: there only, where the surrogate is scanned as well, or in between too: each may reach farther
     """
-    values = study.runs.values
-    lower, upper = values.min(axis=0), values.max(axis=0)
     slope = 1 + int(surrogate.terms.sum(axis=1).max()) if isinstance(surrogate, Expansion) else ROUGH
-    low, high = _widened(study, surrogate, found, SAFETY * error, slope, look)
-    low, high = np.minimum(lower, low), np.maximum(upper, high)
-    width = study.widths(values)
-    beyond = np.maximum(lower - low, high - upper)
-    gap = np.divide(beyond, width, out=np.zeros_like(beyond), where=width > 0)
-    return Enclosure(lower, upper, low, high, gap)
+    return Enclosure.of(study, *_widened(study, surrogate, found, SAFETY * error, slope, look))
 
 
 def enclose(study: Study, surrogate: Surrogate, error: Array) -> DatedEnclosure:
@@ -106,12 +95,8 @@ def enclosure_of_cycles(study: Study, _: Surrogate, found: Extremes, error: Arra
 
     error: of the surrogate at runs that it had not seen, (columns,)
     """
-    values, margin = study.runs.values, SAFETY * (error + found.doubt)
-    lower, upper = values.min(axis=0), values.max(axis=0)
-    low, high = np.minimum(lower, found.lower - margin), np.maximum(upper, found.upper + margin)
-    width = study.widths(values)
-    beyond = np.maximum(lower - low, high - upper)
-    return Enclosure(lower, upper, low, high, np.divide(beyond, width, out=np.zeros_like(beyond), where=width > 0))
+    margin = SAFETY * (error + found.doubt)
+    return Enclosure.of(study, found.lower - margin, found.upper + margin)
 
 
 def _widened(
@@ -183,21 +168,15 @@ BELIEVED = 0.2
 
 
 @dataclass(frozen=True, eq=False)
-class Bounds:
-    """Bounds of every column. lower, upper: attained by runs or, at long times, by runs at the arguments named, to
-    within the error of the surrogate of cycles; lower_outer, upper_outer: no run is expected beyond, nan where the
-    method cannot tell, (columns,); at_lower, at_upper: values of the parameters there, (columns, parameters); gap: the
-    largest distance between both as a share of the width within the horizon, nan where it is not known; horizon: the
-    last instant up to which they meet [s], infinite if they always do; likely: where, with 95 % confidence, 95 % of all
-    runs lie if each value of the parameters is as likely as another, (2, columns), None within the horizon
+class Bounds(Ends):
+    """Bounds of every column: attained by runs or, at long times, to within the error of the surrogate of cycles.
+
+    gap: largest distance between outer and attained ones as a share of the width within the horizon, nan where it is
+    not known; horizon: last instant up to which they meet [s], infinite if they always do; likely: where, with 95 %
+    confidence, 95 % of all runs lie if each value of the parameters is as likely as another, (2, columns), None within
+    the horizon
     """
 
-    lower: Array
-    upper: Array
-    lower_outer: Array
-    upper_outer: Array
-    at_lower: Array
-    at_upper: Array
     gap: float
     horizon: float
     likely: Array | None = None
@@ -301,7 +280,7 @@ def _tested(study: Study, surrogate: Surrogate, named: Extremes, error: Array) -
     values = runs.values
     width = np.tile(study.widths(values), 2)
     gains = np.concatenate([values.min(axis=0) - named.lower, named.upper - values.max(axis=0)])
-    share = np.divide(gains, width, out=np.zeros_like(gains), where=width > 0)
+    share = share_of(gains, width)
     places: list[Array] = []
     for place in np.concatenate([named.at_lower, named.at_upper])[np.argsort(-share)]:
         if len(places) < count and all(np.abs(place - other).max() > TEST_SPACING for other in places):

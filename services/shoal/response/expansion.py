@@ -1,6 +1,6 @@
 """Polynomial expansions in the standardised variables, fitted to runs by least squares: the surrogate of most methods.
 
-The degree is that which predicts best, column by column, what is left out of the fit. Hermite polynomials of high
+The degree is that of the least leave-one-out error, column by column. Hermite polynomials of high
 degree have most of their variance further out than any run, where nothing else constrains them: the outermost runs,
 which the others predict, show some of it, and the standard deviation at places as far out as runs go shows the rest.
 """
@@ -16,7 +16,7 @@ from scipy.linalg import solve_triangular
 
 from shoal.response.inputs import BoolArray, Inputs, IntArray
 from shoal.response.polynomials import Terms, size, total_degree
-from shoal.response.study import Study
+from shoal.response.study import Study, share_of
 from shoal.trajectory import Array
 
 RANK = 1e-13
@@ -104,8 +104,7 @@ def unexplained(values: Array, missed: Array) -> tuple[Array, Array]:
     away = values - values.mean(axis=0)
     squares = np.sqrt(np.mean((away**2 - (away - missed) ** 2) ** 2, axis=0))
     deviation = np.sqrt(np.mean(away**2, axis=0))
-    off = np.divide(squares, 2 * deviation, out=np.zeros_like(squares), where=deviation > 0)
-    return np.sqrt(np.mean(missed**2, axis=0)), np.asarray(off)
+    return np.sqrt(np.mean(missed**2, axis=0)), share_of(squares, 2 * deviation)
 
 
 HIGHEST_TRIED = 20

@@ -204,8 +204,10 @@ class ResponseModel:
 
 
 class _Lane(NamedTuple):
-    """values: (columns,); good: whether they may be believed; away: from what is stated of the start, see `Answers`,
-    and then the words of events of a machine that touches.
+    """One run of a batch.
+
+    values: (columns,); good: whether they may be believed; away: from what is stated of the start, see `Answers`, and
+    then the words of events of a machine that touches.
     """
 
     values: Array

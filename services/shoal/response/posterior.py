@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from scipy import special, stats
 
-from shoal.errors import InputError
-from shoal.estimated import checked_joint, read_estimate
+from shoal.errors import InputError, needs_extra
+from shoal.read_estimate import checked_joint, read_estimate
 from shoal.response.inputs import Joint, UncertainParameter
 from shoal.response.marginals import Frozen, Marginal, Normal
 from shoal.scene import Scene
@@ -78,10 +78,8 @@ def _estimate(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
 
 def _draws(path: Path) -> tuple[dict[str, Any], dict[str, str], dict[str, Array]]:
     """Read draws. Raises InputError."""
-    try:
+    with needs_extra("notebook"):
         import xarray as xr
-    except ModuleNotFoundError:
-        raise InputError("xarray is not installed; install shoal with its extra 'notebook'") from None
     try:
         with xr.open_dataset(path, engine="scipy") as data:
             about = dict(data.attrs)

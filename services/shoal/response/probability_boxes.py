@@ -23,7 +23,7 @@ from shoal.response.inputs import BoolArray, Inputs, IntArray
 from shoal.response.polynomials import Terms
 from shoal.response.runs import TimeIsUpError
 from shoal.response.statistics import DRAWN, QUANTILES
-from shoal.response.study import COARSE, FINE_GAP, SAFETY, Found, Study
+from shoal.response.study import COARSE, FINE_GAP, SAFETY, Ends, Found, Study, share_of
 from shoal.trajectory import Array
 
 
@@ -175,28 +175,6 @@ INTERVAL_VALUES, RUNS_EACH = 8, 128
 """Interval values that are sampled beyond it, and runs at each."""
 
 
-@dataclass(frozen=True)
-class Ends:
-    """A statistic over all interval values. lower, upper: its extremes; lower_outer, upper_outer: with what they may be
-    off by, nan where not known, (columns,); at_lower, at_upper: values of the intervals there, (columns, intervals)
-    """
-
-    lower: Array
-    upper: Array
-    lower_outer: Array
-    upper_outer: Array
-    at_lower: Array
-    at_upper: Array
-
-    @property
-    def widest(self) -> tuple[Array, Array]:
-        """Return the outer bounds; the extremes of runs where none are known."""
-        return tuple(
-            np.where(np.isnan(outer), found, outer)
-            for found, outer in ((self.lower, self.lower_outer), (self.upper, self.upper_outer))
-        )  # type: ignore[return-value]
-
-
 @dataclass(frozen=True, eq=False)
 class ProbabilityBoxes:
     """names: of the intervals; mean, std, quantiles: of every column, where those of quantiles are what the expansion
@@ -241,7 +219,7 @@ def boxes_of(study: Study, found: Found) -> ProbabilityBoxes:
     std = replace(std, lower_outer=np.maximum(std.lower_outer, 0.0))
     ends_of = _quantiles(of, sides, error, study.seed)
     scale = scatter(study, *sides)
-    gap = np.divide(error, scale, out=np.zeros_like(error), where=scale > 0)
+    gap = share_of(error, scale)
     first = study.instants[gap > max(study.gap or 0.0, BEYOND_HOPE)].min(initial=math.inf)
     end = math.inf if math.isinf(first) else float(study.instants[study.instants < first].max(initial=0.0))
     within = gap[study.instants <= end]

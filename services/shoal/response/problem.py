@@ -14,7 +14,7 @@ from shoal.engines import get_engine
 from shoal.engines.contract import sampling_times
 from shoal.engines.starts import StatedStart, Tally
 from shoal.errors import ComputationError, InputError
-from shoal.memory import Memory
+from shoal.evaluation_cache import EvaluationCache
 from shoal.requests.uncertain import Uncertain
 from shoal.response.allocation import costs_of
 from shoal.response.inputs import Inputs
@@ -101,4 +101,4 @@ def _keep(asked: Uncertain, scene: Scene, times: Array, end: float | None) -> Ke
     if asked.checkpoint is None:
         return Keep(None, end)
     study = repr((scene.fingerprint, times.tolist(), asked.engine, versions(("shoal",))))
-    return Keep(Memory(Path(asked.checkpoint), hashlib.sha1(study.encode()).hexdigest(), "study"), end)
+    return Keep(EvaluationCache(Path(asked.checkpoint), hashlib.sha1(study.encode()).hexdigest(), "study"), end)

@@ -135,7 +135,7 @@ def _parameter(name: str, known: Any, scene: Scene) -> UncertainParameter:
 
 
 def _reaching(name: str, marginal: Marginal, low: float, high: float, error: InputError) -> str:
-    """Why a scene refuses an end: a distribution reaches further than its numbers suggest."""
+    """Message for an end that a scene refuses: a distribution reaches further than its numbers suggest."""
     if not marginal.random:
         return str(error)
     below = "; truncated-normal(MEAN,SD,LOW,HIGH) and lognormal(MEAN,SD) stay above zero" if low < 0 < high else ""
@@ -298,7 +298,7 @@ def is_problem(given: Any) -> bool:
 
 
 def from_salib(problem: Mapping[str, Any]) -> dict[str, Marginal]:
-    """Name -> what is known. Bounds without `dists` are uniform distributions, as in SALib. Raises InputError."""
+    """Return marginals by name. Bounds without `dists` are uniform distributions, as in SALib. Raises InputError."""
     names, bounds = list(problem["names"]), list(problem["bounds"])
     kinds = list(problem.get("dists") or ["unif"] * len(names))
     if not len(names) == len(bounds) == len(kinds) == problem["num_vars"]:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from shoal.engines.starts import Elsewhere
 from shoal.error_budget import GOOD, ErrorBudget, Grade
-from shoal.errors import InputError
+from shoal.errors import needs_extra
 from shoal.findings import Concluded, Finding
 from shoal.json_values import plain
 from shoal.response.allocation import Allocation
@@ -180,8 +181,9 @@ class Response(Concluded):
             entries = {"mean": self.statistics.mean, "std": self.statistics.std}
             entries |= {f"q{q:g}": self.statistics.quantiles[k] for k, q in enumerate(QUANTILES)}
         if self.boxes is not None:
-            sides = "lower", "upper", "lower_outer", "upper_outer"
-            entries = {f"{name}_{side}": getattr(of, side) for name, of in self.boxes.named().items() for side in sides}
+            entries = {
+                f"{name}_{side}": getattr(of, side) for name, of in self.boxes.named().items() for side in BOUNDS
+            }
         header, columns = ["t"], [self.times]
         for marker in self.markers:
             for quantity in self.quantities:
@@ -199,10 +201,8 @@ class Response(Concluded):
         mean_upper, std_..., quantiles_... over bound (inner, outer), and their arguments over interval; first_lower to
         total_upper over random (parameters).
         """
-        try:
+        with needs_extra("notebook"):
             import xarray as xr
-        except ModuleNotFoundError:
-            raise InputError("xarray is not installed; install shoal with its extra 'notebook'") from None
         shape = len(self.times), len(self.markers), len(self.quantities)
         base = ("time", "marker", "axis")
         variables: dict[str, tuple[tuple[str, ...], Array]] = {}
@@ -306,20 +306,23 @@ class Response(Concluded):
     def _by_marker(self, entries: Any) -> dict[str, Any]:
         return {marker: {name: entries(marker, name) for name in self.quantities} for marker in self.markers}
 
+    def _listed(self, marker: str, quantity: str, of: Array) -> Any:
+        return plain(self.column(marker, quantity, of))
+
+    def _arguments(self, marker: str, quantity: str, of: Array) -> Any:
+        """Return values of parameters at an extreme over time; of: (columns, parameters)."""
+        return plain(self.column(marker, quantity, of.T).T)
+
     def _bounds(self, marker: str, quantity: str) -> dict[str, Any]:
-        found = self.bounds
+        found, at = self.bounds, partial(self._listed, marker, quantity)
         assert found is not None
-
-        def at(of: Array) -> Any:
-            return plain(self.column(marker, quantity, of))
-
         return {
             "t": plain(self.times),
             **{name: at(getattr(found, name)) for name in BOUNDS},
             "error": at(self.model),
             "gap": plain(self.gap(marker, quantity)),
-            "argument_lower": plain(self.column(marker, quantity, found.at_lower.T).T),
-            "argument_upper": plain(self.column(marker, quantity, found.at_upper.T).T),
+            "argument_lower": self._arguments(marker, quantity, found.at_lower),
+            "argument_upper": self._arguments(marker, quantity, found.at_upper),
             **(
                 {} if self.finer is None else {"lower_moved": at(self.finer.lower), "upper_moved": at(self.finer.upper)}
             ),
@@ -328,23 +331,19 @@ class Response(Concluded):
 
     def _boxes(self, marker: str, quantity: str) -> dict[str, Any]:
         """Numbers over time, of quantiles for each level; arguments are values of `intervals`, in their order."""
-        found = self.boxes
+        found, at = self.boxes, partial(self._listed, marker, quantity)
         assert found is not None
-
-        def at(of: Array) -> Any:
-            return plain(self.column(marker, quantity, of))
-
         entries: dict[str, Any] = {"t": plain(self.times), "intervals": list(found.names)}
         for side in ("lower", "upper"):
             for name, of in (("mean", found.mean), ("std", found.std)):
                 entries[f"{name}_{side}"] = at(getattr(of, side))
                 entries[f"{name}_{side}_outer"] = at(getattr(of, f"{side}_outer"))
-                entries[f"argument_{name}_{side}"] = plain(self.column(marker, quantity, getattr(of, f"at_{side}").T).T)
+                entries[f"argument_{name}_{side}"] = self._arguments(marker, quantity, getattr(of, f"at_{side}"))
             levels = [f"{q:g}" for q in QUANTILES]
             for name, key in ((f"quantiles_{side}", side), (f"quantiles_{side}_outer", f"{side}_outer")):
                 entries[name] = {q: at(getattr(of, key)) for q, of in zip(levels, found.quantiles, strict=True)}
             entries[f"argument_quantiles_{side}"] = {
-                q: plain(self.column(marker, quantity, getattr(of, f"at_{side}").T).T)
+                q: self._arguments(marker, quantity, getattr(of, f"at_{side}"))
                 for q, of in zip(levels, found.quantiles, strict=True)
             }
         if found.shares is not None:
@@ -359,12 +358,8 @@ class Response(Concluded):
         return entries
 
     def _statistics(self, marker: str, quantity: str) -> dict[str, Any]:
-        found = self.statistics
+        found, at = self.statistics, partial(self._listed, marker, quantity)
         assert found is not None
-
-        def at(of: Array) -> Any:
-            return plain(self.column(marker, quantity, of))
-
         return {
             "t": plain(self.times),
             "mean": at(found.mean),

@@ -9,7 +9,7 @@ import numpy as np
 
 from shoal.compile import clock
 from shoal.errors import ComputationError, InputError
-from shoal.memory import Memory
+from shoal.evaluation_cache import EvaluationCache
 from shoal.response.inputs import BoolArray, Inputs
 from shoal.trajectory import Array
 
@@ -43,7 +43,7 @@ class TooManyRunsError(Exception):
 
 @dataclass
 class CachedModel:
-    """A model with a memory: call it with standardised variables.
+    """A model whose runs are kept: call it with standardised variables.
 
     most: runs that it may make; progress: called after every call with their number; controls: runs all over the box
     that test a surrogate; named: runs at the arguments of its extremes, which attain the bounds; aside: runs that were
@@ -64,6 +64,12 @@ class CachedModel:
     named: int = 0
     aside: int = 0
     looked: int = 0
+
+    @classmethod
+    def known(cls, model: Model, inputs: Inputs, xi: Array, values: Array, most: int | None = None) -> CachedModel:
+        """Return a model with these runs, all good, and no further ones unless `most` allows them."""
+        most, good = len(xi) if most is None else most, np.ones(len(xi), dtype=bool)
+        return cls(model, inputs, most, None, 0, "", [xi], [values], [good])
 
     def __call__(self, xi: Array) -> int:
         """Make the runs at these places that have not been made; how many they are.
@@ -116,10 +122,7 @@ class CachedModel:
 
     def part(self, which: BoolArray) -> CachedModel:
         """Some of the good runs, (runs,), for fits to fewer of them."""
-        xi, values = self.xi[which], self.values[which]
-        return CachedModel(
-            self.model, self.inputs, self.most, None, 0, "", [xi], [values], [np.ones(len(xi), dtype=bool)]
-        )
+        return CachedModel.known(self.model, self.inputs, self.xi[which], self.values[which], self.most)
 
     @property
     def left(self) -> int:
@@ -185,7 +188,7 @@ class Keep:
     was refused because of it
     """
 
-    memory: Memory | None = None
+    memory: EvaluationCache | None = None
     end: float | None = None
     over: bool = False
 

@@ -19,7 +19,7 @@ from scipy.stats import qmc
 
 from shoal.response.expansion import Expansion
 from shoal.response.inputs import BoolArray, Inputs, inside
-from shoal.response.study import Study, TransformedMoments
+from shoal.response.study import Study, TransformedMoments, share_of
 from shoal.trajectory import Array
 
 CONFIDENCE = float(special.ndtri(0.975))
@@ -70,7 +70,7 @@ def of_expansion(found: Expansion, inputs: Inputs, error: Array | None, runs: in
     deviation = unknown
     if error is not None and found.squares is not None:
         # What is not explained is missing in the deviation as a whole, and what is explained scatters.
-        missing = np.divide(error**2, 2 * np.sqrt(variance), out=np.zeros_like(error), where=varies)
+        missing = share_of(error**2, 2 * np.sqrt(variance))
         deviation = CONFIDENCE * np.hypot(np.maximum(found.squares, error) / np.sqrt(runs), missing)
     return Statistics(found.mean, np.sqrt(variance), quantiles, first, total, known, deviation)
 
@@ -83,7 +83,7 @@ def of_runs(values: Array, indices: Array | None, parameters: int) -> Statistics
     first, total = unknown if indices is None else indices
     deviation = values.std(axis=0, ddof=1) if len(values) > 1 else np.full(values.shape[1], np.nan)
     squares = ((values - values.mean(axis=0)) ** 2).std(axis=0)
-    off = np.divide(squares, 2 * deviation, out=np.zeros_like(squares), where=deviation > 0) / np.sqrt(independent)
+    off = share_of(squares, 2 * deviation) / np.sqrt(independent)
     return Statistics(
         values.mean(axis=0),
         deviation,
@@ -149,7 +149,7 @@ def moment_errors(
     """Return the 95 % confidence errors of mean and std, (columns,) each; fitted: the expansion of fewer runs."""
     made, std, left_out = len(study.runs.xi), np.sqrt(found.variance), found.left_out
     squares = np.maximum(found.squares, left_out)
-    missing = np.divide(left_out**2, 2 * std, out=np.zeros_like(std), where=std > 0)
+    missing = share_of(left_out**2, 2 * std)
     scatter = CONFIDENCE * np.array([left_out / np.sqrt(made), np.hypot(squares / np.sqrt(made), missing)])
     apart, first = np.zeros_like(scatter), np.arange(made) < made // 2
     for half in (first, ~first):

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Protocol
+from typing import Protocol, Self
 
 import numpy as np
 
@@ -39,6 +39,11 @@ RUNS = 300
 """Runs of a polynomial chaos unless it is coarse by then."""
 PER_TERM = 1.25
 """Runs for every term of a polynomial at designed places, at least; with one parameter as many as terms will do."""
+
+
+def share_of(part: Array, whole: Array) -> Array:
+    """Return parts as shares of what they are parts of, elementwise; zero of nothing."""
+    return np.divide(part, whole, out=np.zeros(np.broadcast_shapes(np.shape(part), np.shape(whole))), where=whole > 0)
 
 
 def fair_runs(terms: int) -> int:
@@ -167,6 +172,43 @@ class TransformedMoments(Protocol):
 
 
 @dataclass(frozen=True)
+class Ends:
+    """Extremes of answers, or of their statistics, over intervals.
+
+    lower, upper: attained, (columns,); lower_outer, upper_outer: none is expected beyond, nan where that is not known,
+    (columns,); at_lower, at_upper: values of the parameters there, (columns, parameters)
+    """
+
+    lower: Array
+    upper: Array
+    lower_outer: Array
+    upper_outer: Array
+    at_lower: Array
+    at_upper: Array
+
+    @property
+    def widest(self) -> tuple[Array, Array]:
+        """Return the outer bounds; the extremes of runs where none are known."""
+        low, high = self.lower_outer, self.upper_outer
+        return np.where(np.isnan(low), self.lower, low), np.where(np.isnan(high), self.upper, high)
+
+    def widened(self, off: Array) -> Self:
+        """Return the same with outer bounds that lie so much further out, (columns,)."""
+        return replace(self, lower_outer=self.lower_outer - off, upper_outer=self.upper_outer + off)
+
+    def columns(self, which: slice) -> Ends:
+        """Return some of the columns."""
+        return Ends(*(getattr(self, field.name)[which] for field in fields(Ends)))
+
+    def with_columns(self, which: IntArray, part: Ends) -> Ends:
+        """Return the same with other values in some columns, (n,)."""
+        values = {name: np.array(of) for name, of in vars(self).items()}
+        for name, of in vars(part).items():
+            values[name][which] = of
+        return Ends(**values)
+
+
+@dataclass(frozen=True)
 class Enclosure:
     """Attained and outer bounds, (columns,); gap: their distance as a share of the width of the group, (columns,)."""
 
@@ -176,10 +218,18 @@ class Enclosure:
     upper_outer: Array
     gap: Array
 
+    @classmethod
+    def of(cls, study: Study, low: Array, high: Array) -> Enclosure:
+        """Return what the runs of a study attain within outer bounds, which hold at least these, (columns,) each."""
+        values = study.runs.values
+        lower, upper = values.min(axis=0), values.max(axis=0)
+        low, high = np.minimum(lower, low), np.maximum(upper, high)
+        return cls(lower, upper, low, high, share_of(np.maximum(lower - low, high - upper), study.widths(values)))
+
 
 @dataclass(frozen=True)
 class DatedEnclosure:
-    """Bounds by so many runs."""
+    """Bounds, and the number of runs that they follow from."""
 
     runs: int
     enclosure: Enclosure

@@ -65,8 +65,7 @@ def columns_of(study: Study, columns: IntArray) -> Study:
 
 def with_answers(study: Study, inputs: Inputs, xi: Array, values: Array) -> Study:
     """Return a study with other answers."""
-    good = np.ones(len(xi), dtype=bool)
-    return replace(study, runs=CachedModel(study.runs.model, inputs, len(xi), None, 0, "", [xi], [values], [good]))
+    return replace(study, runs=CachedModel.known(study.runs.model, inputs, xi, values))
 
 
 NODES, REACH = 2**13, 9.0

@@ -25,7 +25,7 @@ from shoal.response import findings as kinds
 from shoal.response.enclosure import Bounds
 from shoal.response.inputs import BoolArray
 from shoal.response.machine import ResponseModel, stable
-from shoal.response.probability_boxes import Ends, ProbabilityBoxes
+from shoal.response.probability_boxes import ProbabilityBoxes
 from shoal.response.problem import UncertainProblem
 from shoal.response.respond import ModelResponse
 from shoal.response.runs import CachedModel
@@ -117,12 +117,8 @@ class ModelErrors:
     def of_bounds(self, found: Bounds) -> Bounds:
         """Bounds whose outer ones allow for the model."""
         off, chance = self.columns, found.likely
-        return replace(
-            found,
-            lower_outer=found.lower_outer - off,
-            upper_outer=found.upper_outer + off,
-            likely=None if chance is None else np.stack([chance[0] - off, chance[1] + off]),
-        )
+        wider = None if chance is None else np.stack([chance[0] - off, chance[1] + off])
+        return replace(found.widened(off), likely=wider)
 
     def of_statistics(self, found: Statistics) -> Statistics:
         """Statistics whose errors allow for the model: a deviation differs by no more than the answers do."""
@@ -130,14 +126,11 @@ class ModelErrors:
 
     def of_boxes(self, found: ProbabilityBoxes) -> ProbabilityBoxes:
         """Statistics over intervals whose outer bounds allow for the model."""
-        std = self._wider(found.std)
+        off, std = self.columns, found.std.widened(self.columns)
         std = replace(std, lower_outer=np.maximum(std.lower_outer, 0.0))
-        quantiles = tuple(self._wider(one) for one in found.quantiles)
-        return replace(found, mean=self._wider(found.mean), std=std, quantiles=quantiles)
-
-    def _wider(self, found: Ends) -> Ends:
-        off = self.columns
-        return replace(found, lower_outer=found.lower_outer - off, upper_outer=found.upper_outer + off)
+        return replace(
+            found, mean=found.mean.widened(off), std=std, quantiles=tuple(one.widened(off) for one in found.quantiles)
+        )
 
 
 def unestimated(machine: ResponseModel) -> ModelErrors:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from shoal.atomic_write import atomic_write
 from shoal.engines import get_engine
 from shoal.errors import InputError
 from shoal.response.inputs import UncertainParameter
@@ -18,7 +19,6 @@ from shoal.response.machine import quantities
 from shoal.response.result import Response
 from shoal.scene import Scene
 from shoal.scene.edited import as_yaml
-from shoal.whole import whole
 
 SIDES = "lower", "upper"
 
@@ -33,7 +33,7 @@ class Worst:
 
     def save(self, path: Path) -> None:
         """Write the scene as YAML. Raises ComputationError."""
-        with whole(path) as part:
+        with atomic_write(path) as part:
             part.write_text(as_yaml(self.scene.model_dump(mode="json", exclude_unset=True)))
 
 

@@ -20,7 +20,7 @@ from shoal.fmu.energy import energies
 from shoal.mechanics.analysis.modes import modes
 from shoal.mechanics.analysis.statics import statics
 from shoal.scene import Scene, load_scene
-from shoal.wire import packed, unpacked
+from shoal.serialization import packed, unpacked
 
 GROUND = {"body": "ground", "point": [0.0, 0.0]}
 

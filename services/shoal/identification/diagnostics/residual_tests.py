@@ -22,6 +22,8 @@ _SURE = 1e-6
 """Chance below which an estimated noise counts as exceeded; models are looked at for many reasons, so it is small."""
 _LAGS = 16
 """Order of the linear prediction, at most a fifth of the samples: two coefficients for each of eight spectral lines."""
+_FIRST = 10
+"""Lags of the test of Ljung and Box, at most a fifth of the samples."""
 _FAR = 3
 """Samples later they do: noise is alike so far apart by no differences, such as those that make a rate of angles."""
 _FEW = 0.1
@@ -245,10 +247,10 @@ def _alike(signal: Array, fast: bool) -> float:
     return max(neighbours, (1.0 - unforeseen) * float(signal @ signal))
 
 
-def ljung_box(signal: Array, lags: int = 10) -> float:
+def ljung_box(signal: Array) -> float:
     """Chance that white noise is as correlated as a signal (samples,) over its first lags."""
     count, power = len(signal), float(signal @ signal)
-    lags = min(lags, count // 5)
+    lags = min(_FIRST, count // 5)
     if lags < 1 or power == 0.0:
         return 1.0
     rho = np.array([signal[lag:] @ signal[:-lag] for lag in range(1, lags + 1)]) / power

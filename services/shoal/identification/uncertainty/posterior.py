@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from shoal.compile import clock
-from shoal.errors import InputError
+from shoal.errors import InputError, needs_extra
 from shoal.findings import Finding
 from shoal.identification import findings as kinds
 from shoal.identification.conventions import LEVEL
@@ -141,10 +141,8 @@ class Posterior:
 
         Every walker is a chain. Raises InputError without xarray.
         """
-        try:
+        with needs_extra("notebook"):
             import xarray as xr
-        except ModuleNotFoundError:
-            raise InputError("xarray is not installed; install shoal with its extra 'notebook'") from None
         ensembles, steps, walkers, _ = self.draws.shape
         chains = self.draws.swapaxes(1, 2).reshape(ensembles * walkers, steps, -1)
         coordinates = {

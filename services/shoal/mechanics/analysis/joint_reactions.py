@@ -122,7 +122,7 @@ class Reactions(Concluded):
 
     @property
     def findings(self) -> list[Finding]:  # type: ignore[override]
-        """Whether the bodies are in balance, and what other runs show."""
+        """Findings about the balance of the bodies, and of other runs."""
         if self.impacts:
             struck = ", ".join(
                 f"{place_of(one)} with an impulse of {one['impulse']:.6g} N s (or N m s)" for one in self.impacts

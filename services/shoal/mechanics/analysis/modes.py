@@ -159,7 +159,7 @@ class Modes(Concluded):
 
     @property
     def findings(self) -> list[Finding]:  # type: ignore[override]
-        """What was found out about the modes, which names those that are concerned, and about their state."""
+        """Findings about the modes, which name those that are concerned, and about their state."""
         found = []
         if not self.balanced and self.about != "start":
             found.append(kinds.UNBALANCED.found("the forces do not balance"))

@@ -31,7 +31,7 @@ UNEVEN = 0.02
 
 
 def auto(study: Study) -> Found:
-    """Choose by what is known of the parameters and by how the answers depend on them.
+    """Choose by the knowledge of the parameters and by the dependence of the answers on them.
 
     Intervals: `bounds`, `time-warp`, `torus`, or `by_word` where runs have different events. Distributions:
     quadrature, chaos or else quasi-random runs. Both: `nested`.

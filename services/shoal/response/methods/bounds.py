@@ -113,7 +113,7 @@ def _carried(plan: Screened, degree: int) -> bool:
 
 
 def _fit_columns(plan: Screened, degree: int) -> Expansion:
-    """Fit every column by this degree, or by a lower one that predicts much better what is left out of its fit."""
+    """Fit every column by this degree, or by a lower one of much smaller leave-one-out error."""
     inputs, runs = plan.study.inputs, plan.study.runs
     best = fit(inputs, runs.xi, runs.values, plan.terms(degree))
     for lower in range(degree - 1, 0, -1):
@@ -142,7 +142,7 @@ def _falling(plan: Screened, found: Expansion, degree: int, before: Decay | None
 
 
 def _with_more_terms(plan: Screened, found: Expansion, decay: Decay | None) -> Expansion:
-    """Return each column with more terms than runs, unless the other predicts clearly better what is left out."""
+    """Return each column with more terms than runs, unless the leave-one-out error of the other is clearly smaller."""
     if decay is None:
         return found
     runs = plan.study.runs
@@ -236,7 +236,7 @@ def _promising(plan: Screened, surrogate: Expansion, found: Extremes) -> Array:
 
 
 def _enough(plan: Screened) -> float:
-    """The gap that ends a study: what is asked for or, where nothing is, what a fair number of runs makes it."""
+    """Gap that ends a study: that of the request, else the one that a fair number of runs gives."""
     study = plan.study
     if study.gap is not None:
         return study.gap

@@ -17,7 +17,7 @@ from shoal.response.expansion import WORSE, Expansion, fit
 from shoal.response.extremes import MOST_CORNERS, corners
 from shoal.response.inputs import BoolArray, Inputs, IntArray
 from shoal.response.polynomials import size, total_degree
-from shoal.response.study import FINE_GAP, PER_TERM, SAFETY, DatedEnclosure, Enclosure, Found, Study
+from shoal.response.study import FINE_GAP, PER_TERM, SAFETY, DatedEnclosure, Enclosure, Found, Study, share_of
 from shoal.trajectory import Array
 
 FIRST = 16
@@ -64,7 +64,7 @@ def by_word(study: Study) -> Found:
     looked = _look(study, unseen)
     for _ in range(ROUNDS):
         before = len(study.runs.xi)
-        if looked.gap.max() <= wanted or study.runs.evaluations - made + 3 * each > most:
+        if looked.enclosure.gap.max() <= wanted or study.runs.evaluations - made + 3 * each > most:
             break
         study.runs(np.vstack([_between(study, each), looked.places[:each], looked.sparse[:each]]))
         # What the polynomials missed of runs that they had not seen, where their words are as predicted.
@@ -74,8 +74,7 @@ def by_word(study: Study) -> Found:
     assert words is not None
     count = len(np.unique(words[:, -1]))
     why = f"runs have {count} words of events until the last instant, each with polynomials of its own"
-    enclosure = Enclosure(looked.lower, looked.upper, looked.low, looked.high, looked.gap)
-    return Found(why, error=looked.error, enclosed=DatedEnclosure(study.runs.evaluations, enclosure))
+    return Found(why, error=looked.error, enclosed=DatedEnclosure(study.runs.evaluations, looked.enclosure))
 
 
 @dataclass(frozen=True)
@@ -97,18 +96,14 @@ class _Piece:
 
 @dataclass(frozen=True)
 class _Looked:
-    """Bounds: lower, upper that runs attain, low, high with what the polynomials are off by, gap, error, (columns,).
+    """Polynomials of all parts, and the bounds that follow.
 
-    places: where runs promise to widen the bounds, the best first; sparse: that are farthest from the runs of their
-    word, denser towards the ends of its part as polynomials need it; pieces: instants, their words, columns and
-    polynomials of each part
+    error: of the polynomials, (columns,); places: where runs promise to widen the bounds, the best first; sparse: that
+    are farthest from the runs of their word, denser towards the ends of its part as polynomials need it; pieces:
+    instants, their words, columns and polynomials of each part
     """
 
-    lower: Array
-    upper: Array
-    low: Array
-    high: Array
-    gap: Array
+    enclosure: Enclosure
     error: Array
     places: Array
     sparse: Array
@@ -161,13 +156,12 @@ def _look(study: Study, unseen: Array) -> _Looked:
             low[columns] = np.minimum(low[columns], finer.min(axis=0, initial=np.inf) - SAFETY * off)
             high[columns] = np.maximum(high[columns], finer.max(axis=0, initial=-np.inf) + SAFETY * off)
             beyond = np.maximum(lower[columns] - predicted, predicted - upper[columns])
-            share = np.divide(beyond, width[columns], out=np.zeros_like(beyond), where=width[columns] > 0)
+            share = share_of(beyond, width[columns])
             promise[possible] = np.maximum(promise[possible], share.max(axis=1, initial=0.0))
-    apart = np.maximum(lower - low, high - upper)
-    gap = np.divide(apart, width, out=np.zeros_like(apart), where=width > 0)
     order = np.argsort(-promise, kind="stable")
     sparse = scanned[np.argsort(-away, kind="stable")]
-    return _Looked(lower, upper, low, high, gap, error, scanned[order[promise[order] > 0.0]], _apart(sparse), pieces)
+    promising, enclosure = scanned[order[promise[order] > 0.0]], Enclosure.of(study, low, high)
+    return _Looked(enclosure, error, promising, _apart(sparse), pieces)
 
 
 def _alike(words: Array) -> list[IntArray]:

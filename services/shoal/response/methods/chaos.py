@@ -17,7 +17,7 @@ from shoal.response.inputs import BoolArray
 from shoal.response.polynomials import size
 from shoal.response.regularised import likeliest, regularised, trimmed
 from shoal.response.statistics import moment_errors
-from shoal.response.study import CONVERGED, RUNS, Found, Study
+from shoal.response.study import CONVERGED, RUNS, Found, Study, share_of
 from shoal.response.transformations import Transformed, compared, transformed, untransformed
 from shoal.trajectory import Array
 
@@ -34,13 +34,13 @@ DECAYS = 6
 
 
 def chaos(study: Study) -> Found:
-    """Expand in `degree`, or in the degree that predicts best what is left out of its fit. Raises InputError."""
+    """Expand in `degree`, or in the degree of the least leave-one-out error. Raises InputError."""
     study.random_only("chaos")
     return grown(study, study.count or RUNS)
 
 
 def grown(study: Study, fair: int) -> Found:
-    """Make more and more runs, until an expansion predicts those that it was not fitted to, or so many are made.
+    """Make more and more runs, until an expansion predicts those that it was not fitted to, or `fair` are made.
 
     One that is still coarse then may take more.
     """
@@ -127,4 +127,4 @@ def shares(study: Study, left_out: Array) -> Array:
     """Error at runs that are left out, (columns,), as a share of the standard deviation of the group, (columns,)."""
     values = study.runs.values
     scale = study.largest(values.std(axis=0), values)
-    return np.divide(left_out, scale, out=np.zeros_like(scale), where=scale > 0)
+    return share_of(left_out, scale)

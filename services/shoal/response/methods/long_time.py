@@ -21,7 +21,7 @@ from shoal.response.extremes import Surrogate
 from shoal.response.inputs import IntArray
 from shoal.response.polynomials import Terms, size, total_degree
 from shoal.response.runs import TooManyRunsError
-from shoal.response.study import CLEARLY, FINE_GAP, PER_TERM, SAFETY, Found, Study
+from shoal.response.study import CLEARLY, FINE_GAP, PER_TERM, SAFETY, Found, Study, share_of
 from shoal.trajectory import Array
 
 SAMPLES = 2**15
@@ -262,11 +262,11 @@ def _controlled(study: Study, found: Found) -> Found:
 def _share(study: Study, error: Array) -> float:
     """Return the largest gap that an error leaves between attained and outer bounds, as a share of the width."""
     width = study.widths(study.runs.values)
-    return float(np.divide(SAFETY * error, width, out=np.zeros_like(width), where=width > 0).max())
+    return float(share_of(SAFETY * error, width).max())
 
 
 def _carried(parameters: int, degree: int, runs: int) -> bool:
-    """Return whether so many runs carry that degree."""
+    """Return whether a number of runs carries a degree."""
     return runs >= (1 if parameters == 1 else PER_TERM) * size(parameters, degree)
 
 

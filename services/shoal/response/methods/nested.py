@@ -31,7 +31,6 @@ from shoal.response.probability_boxes import (
     RUNS_EACH,
     Above,
     Conditional,
-    Ends,
     Mean,
     ProbabilityBoxes,
     coarse,
@@ -39,7 +38,7 @@ from shoal.response.probability_boxes import (
     std_gap,
 )
 from shoal.response.runs import Answers, CachedModel, TimeIsUpError, TooManyRunsError
-from shoal.response.study import CONVERGED, RUNS, SAFETY, Found, Study
+from shoal.response.study import CONVERGED, RUNS, SAFETY, Ends, Found, Study, share_of
 from shoal.trajectory import Array
 
 SHARE = 1.6
@@ -57,7 +56,7 @@ ENOUGH = 1
 
 
 def nested(study: Study) -> Found:
-    """Expand in `degree`, or in the degree that predicts best what is left out of its fit. Raises InputError."""
+    """Expand in `degree`, or in the degree of the least leave-one-out error. Raises InputError."""
     inputs, runs = study.inputs, study.runs
     if not inputs.mixed:
         raise InputError("vary: method nested needs an interval and a distribution; auto takes either alone")
@@ -163,7 +162,7 @@ def _unseen(study: Study, found: Expansion, where: Array, before: int) -> Array:
 def _gap(study: Study, error: Array, sides: list[Extremes], late: bool) -> float:
     """The largest; late: before the horizon, beyond which no number of runs helps."""
     scale = scatter(study, *sides)
-    gaps = np.divide(SAFETY * error, scale, out=np.zeros_like(error), where=scale > 0)
+    gaps = share_of(SAFETY * error, scale)
     end = study.instants[gaps > BEYOND_HOPE].min(initial=math.inf) if late else math.inf
     return float(gaps[study.instants < end].max(initial=0.0))
 
@@ -230,7 +229,7 @@ class Inner:
         self.rule: Rule | None = None
 
     def settle(self, places: Mapping[str, Array], most: int) -> Array | None:
-        """Choose the first rule that agrees with the one before it, of at most so many runs.
+        """Choose the first rule that agrees with the one before it, of at most `most` runs.
 
         places: path -> values of the intervals. Returns by how much means and deviations differ at most,
         (2 columns,), or None where no two rules agree.
@@ -294,9 +293,9 @@ def resolved(study: Study, boxes: ProbabilityBoxes) -> tuple[ProbabilityBoxes, s
     shares = None if boxes.shares is None else boxes.shares.copy()
     if shares is not None:
         shares[..., columns] = np.nan
-    std = _within(boxes.std, columns, std)
+    std = boxes.std.with_columns(columns, std)
     gap = std_gap(study, std, boxes.horizon)
-    return replace(boxes, mean=_within(boxes.mean, columns, mean), std=std, shares=shares, std_gap=gap), how
+    return replace(boxes, mean=boxes.mean.with_columns(columns, mean), std=std, shares=shares, std_gap=gap), how
 
 
 def _bounded(study: Study, columns: IntArray, spared: int) -> tuple[Ends, Ends, str]:
@@ -319,32 +318,10 @@ def _bounded(study: Study, columns: IntArray, spared: int) -> tuple[Ends, Ends, 
     if np.isnan(found.lower_outer).any():
         raise TooManyRunsError
     count = len(columns)
-    mean, square = (
-        Ends(
-            found.lower[part],
-            found.upper[part],
-            found.lower_outer[part],
-            found.upper_outer[part],
-            found.at_lower[part],
-            found.at_upper[part],
-        )
-        for part in (slice(count), slice(count, None))
-    )
+    mean, square = (found.columns(part) for part in (slice(count), slice(count, None)))
     sides = ("lower", "upper", "lower_outer", "upper_outer")
     std = replace(square, **{side: np.sqrt(np.maximum(getattr(square, side), 0.0)) for side in sides})
-    std = _wider(std, apart[count:])
+    std = std.widened(apart[count:])
     std = replace(std, lower_outer=np.maximum(std.lower_outer, 0.0))
     how = f"{runs.evaluations} interval values with {len(inner.rule.xi)} runs over the random parameters each"
-    return _wider(mean, apart[:count]), std, how
-
-
-def _wider(found: Ends, off: Array) -> Ends:
-    return replace(found, lower_outer=found.lower_outer - off, upper_outer=found.upper_outer + off)
-
-
-def _within(whole: Ends, columns: IntArray, part: Ends) -> Ends:
-    """Replace some columns."""
-    values_of = {name: np.array(of) for name, of in vars(whole).items()}
-    for name, of in vars(part).items():
-        values_of[name][columns] = of
-    return Ends(**values_of)
+    return mean.widened(apart[:count]), std, how

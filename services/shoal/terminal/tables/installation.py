@@ -22,7 +22,7 @@ def doctor_table(checks: list[Check]) -> None:
 
 
 def import_table(rows: Iterable[Row]) -> None:
-    """Print what became what, on stderr; what is left out has lines of its own."""
+    """Print the parts of an import and their counterparts on stderr; omitted parts have lines of their own."""
     table = screen.untitled("element", "became", "remark")
     for row in rows:
         if row.became:

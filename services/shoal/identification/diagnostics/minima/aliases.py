@@ -88,7 +88,7 @@ def _limit(model: ForwardModel, point: Array) -> float:
     return mine + (HARDLY * model.rows.signal) ** 2 * len(model.rows.time) / model.rows.samples
 
 
-def _line(model: ForwardModel, point: Array, k: int, values: Array) -> Array:
+def _line(point: Array, k: int, values: Array) -> Array:
     """The point with other values of a parameter, (values, parameters)."""
     points = np.repeat(point[None], len(values), axis=0)
     points[:, k] = values
@@ -98,7 +98,7 @@ def _line(model: ForwardModel, point: Array, k: int, values: Array) -> Array:
 def _unresolved(model: ForwardModel, point: Array, k: int) -> bool:
     """Return whether the bounds of a parameter hold motions that swing faster than the samples show."""
     ends = [np.linspace(point[k], end, _LOOKS + 1)[1:] for end in (model.lower[k], model.upper[k])]
-    points = _line(model, point, k, np.concatenate([point[k : k + 1], *ends]))
+    points = _line(point, k, np.concatenate([point[k : k + 1], *ends]))
     for name in model.measurement.recordings:
         at, straight, between = (seen[1:] - seen[0] for seen in beside_samples(model, points, name))
         off, size = np.mean((between - straight) ** 2, axis=1), np.var(at, axis=1)
@@ -113,7 +113,7 @@ def _dips(model: ForwardModel, point: Array, k: int) -> Array:
     rows = len(model.rows.time)
 
     def scanned(values: Array) -> tuple[Array, Array, Array]:
-        points = _line(model, point, k, values)
+        points = _line(point, k, values)
         if not np.any(others):
             residuals = model.uncounted(points)
             return residuals[:, :rows], model.cost(residuals), points

@@ -70,7 +70,7 @@ def _of_class(value: Any) -> Any:
 
 
 def unpacked(found: Any) -> Any:
-    """What `packed` was given; JSON without its marks is left as it is. Raises ValueError for what it never makes."""
+    """Return the value that `packed` was given; JSON without its marks stays as it is. Raises ValueError."""
     if isinstance(found, list):
         return [unpacked(one) for one in found]
     if not isinstance(found, dict):

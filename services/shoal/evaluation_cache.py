@@ -20,7 +20,7 @@ _HEAD = struct.Struct("<20sII")
 """Key of a batch, bytes that follow, and their checksum."""
 
 
-class Memory:
+class EvaluationCache:
     """Answers of a model to batches of points, in a file that only grows; what a crash cut off at its end is dropped.
 
     Methods are deterministic, so replaying one from its seed asks for the same batches in the same order; those that

@@ -18,12 +18,12 @@ LONGEST = 50
 
 
 def file_name(name: str) -> str:
-    """What a scene is called, as the name of a file in any folder, without an ending: no separators, not hidden."""
+    """Return the name of a scene as that of a file in any folder, without an ending: no separators, not hidden."""
     return re.sub(r"[^\w.-]+", "-", name).strip(".-")[:LONGEST] or "scene"
 
 
 @contextmanager
-def whole(path: Path) -> Iterator[Path]:
+def atomic_write(path: Path) -> Iterator[Path]:
     """A place to write to, beside `path`, which takes its name when the block ends well; else `path` stays as it was.
 
     A pipe or a device stays what it is and is written into. Raises ComputationError where it cannot be written, as on a

@@ -13,8 +13,8 @@ from scipy import stats
 from shoal.engines.sweep import SpotCheck
 from shoal.error_budget import ErrorBudget
 from shoal.scene import load_scene
+from shoal.serialization import KIND, packed, unpacked
 from shoal.trajectory import Status
-from shoal.wire import KIND, packed, unpacked
 
 
 def crossed(value: Any) -> Any:
@@ -63,7 +63,7 @@ def test_plain_json_is_left_alone() -> None:
         {KIND: "os:system", "is": "true"},
         {KIND: "shoal.cli:main", "is": {}},
         {KIND: "shoal.library:Path", "is": {}},
-        {KIND: "shoal.whole:os.remove", "is": {}},
+        {KIND: "shoal.atomic_write:os.remove", "is": {}},
         {KIND: "shoal.engines.sweep:SpotCheck", "is": {"looked_at": 1, "guess": 2}},
         {KIND: "shoal.trajectory:Status", "is": "fine"},
         {KIND: "shoal.nowhere:Nothing", "is": {}},
