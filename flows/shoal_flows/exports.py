@@ -8,6 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from shoal.atomic_write import file_name
 from shoal.engines import get_engine
 from shoal.engines.verification import verified
 from shoal.errors import InputError
@@ -19,7 +20,6 @@ from shoal.pictures import files
 from shoal.requests.fmu import Fmu
 from shoal.scene import Scene
 from shoal.trajectory import Trajectory
-from shoal.whole import file_name
 
 FMU = "fmu"
 MOTIONS = ("csv", "parquet", "nc")

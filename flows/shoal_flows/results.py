@@ -59,11 +59,6 @@ class Study:
 class Answer(Protocol):
     """Interface of the library's answers."""
 
-    @property
-    def ok(self) -> bool:
-        """Return whether it may be believed."""
-        ...
-
     def to_json(self) -> dict[str, Any]:
         """Return the answer as plain data."""
         ...
@@ -74,7 +69,7 @@ A = TypeVar("A", bound=Answer)
 
 @dataclass(frozen=True)
 class Logged(Generic[A]):
-    """An answer with the id of its run; trusted if the answer is."""
+    """An answer with the id of its run; trusted if its verdict leaves no doubt."""
 
     answer: A
     run_id: str
@@ -82,7 +77,7 @@ class Logged(Generic[A]):
     @property
     def trusted(self) -> bool:
         """Return whether it may be believed."""
-        return self.answer.ok
+        return not self.doubts()
 
     def doubts(self) -> list[str]:
         """Return why it is not trusted."""
@@ -111,25 +106,14 @@ class Responded(Logged[Response]):
 
 
 @dataclass(frozen=True)
-class Simulated:
-    """A motion with the id of its run."""
+class Simulated(Logged[Trajectory]):
+    """A motion of a scene."""
 
     scene: Scene
-    motion: Trajectory
-    run_id: str
-
-    @property
-    def trusted(self) -> bool:
-        """Return whether the motion may be believed."""
-        return self.motion.ok
-
-    def doubts(self) -> list[str]:
-        """Return why it is not trusted."""
-        return list(verdict(self.motion).doubts)
 
     def to_json(self) -> dict[str, Any]:
-        """The object that `shoal run forward --json` prints."""
-        return plain({**self.motion.to_json(), "scene": self.scene.name, "run_id": self.run_id})  # type: ignore[no-any-return]
+        """Return the motion with the name of its scene."""
+        return plain({**super().to_json(), "scene": self.scene.name})  # type: ignore[no-any-return]
 
 
 @dataclass(frozen=True)
@@ -138,24 +122,13 @@ class AtRest(Logged[Equilibrium]):
 
 
 @dataclass(frozen=True)
-class Selected:
-    """A chosen model with the id of its run."""
-
-    selection: Selection
-    run_id: str
-
-    @property
-    def trusted(self) -> bool:
-        """Return whether it meets the tolerance."""
-        return self.selection.met and self.selection.trajectory.ok
-
-    def doubts(self) -> list[str]:
-        """Return why it is not trusted."""
-        return list(verdict(self.selection).doubts)
+class Selected(Logged[Selection]):
+    """A chosen model."""
 
     def to_json(self) -> dict[str, Any]:
-        """The object that `shoal run select --json` prints."""
-        return {**self.selection.trajectory.to_json(), "selection": self.selection.to_json(), "run_id": self.run_id}
+        """Return the motion of the model, and how it was chosen."""
+        motion, selection = self.answer.trajectory.to_json(), self.answer.to_json()
+        return {**motion, "selection": selection, "run_id": self.run_id}
 
 
 @dataclass(frozen=True)

@@ -83,11 +83,11 @@ def show(result: Any) -> None:
     elif isinstance(result, DemoResult):
         demo_tables(console, result)
     elif isinstance(result, Simulated):
-        tables.trajectory_table(result.motion, result.scene)
+        tables.trajectory_table(result.answer, result.scene)
     elif isinstance(result, AtRest):
         tables.equilibrium_table(result.answer)
     elif isinstance(result, Selected):
-        tables.selection_table(result.selection)
+        tables.selection_table(result.answer)
     elif isinstance(result, Designed):
         tables.design_table(result.answer)
     elif isinstance(result, Responded):

@@ -257,7 +257,7 @@ def test_a_study_is_repeated_from_its_run_alone(tmp_path: Path) -> None:
     again = rerun(first.run_id)
     assert again.now != first.run_id
     assert not again.different
-    assert again.figures["final/x"][0] == first.motion.marker(first.motion.markers[-1])[-1, 0]
+    assert again.figures["final/x"][0] == first.answer.marker(first.answer.markers[-1])[-1, 0]
     assert len(again.figures) >= 5
     # As if the first had found something else.
     _client().log_metric(first.run_id, "final/x", 0.0)

@@ -22,7 +22,6 @@ def compare(asked: Compare) -> Compared:
         raise InputError(f"engines: give two different ones or more, found {', '.join(asked.engines)}")
     name = title(str(asked.scene))
     with progress(1, f"{name} on {', '.join(asked.engines or ['several engines'])}"):
-        comparison, picture, run_id = run_engines(asked)
-    result = Compared(comparison, run_id, picture)
-    show_result(f"{name}: engines", tables.of_comparison(comparison), result)
+        result = Compared(*run_engines(asked))
+    show_result(f"{name}: engines", tables.of_comparison(result.answer), result)
     return ended(result)

@@ -5,14 +5,13 @@ from __future__ import annotations
 from contextlib import ExitStack
 
 from prefect import flow
-from shoal.engines.compare import Comparison
 from shoal.requests.compare import Compare
 
 from shoal_flows.flows.runner import side_by_side
 from shoal_flows.flows.study import Draw, Running, open_running
 from shoal_flows.flows.tasks import measure, run_engines
 from shoal_flows.jobs import Cell
-from shoal_flows.pictures import Picture, draw_convergence, draw_mesh_error, draw_residuals, draw_trajectory
+from shoal_flows.pictures import draw_convergence, draw_mesh_error, draw_residuals, draw_trajectory
 from shoal_flows.plan import CASES, SAME_MESH, SLOWEST_FIRST, TITLES, mesh_cells, method_cells, same_mesh_cells
 from shoal_flows.results import Compared, DemoResult, Study
 
@@ -47,7 +46,7 @@ def demo() -> DemoResult:
             {case: _published(study) for case, study in studies.items()},
             {case: _finish(study, mesh_error=draw_mesh_error) for case, study in meshes.items()},
             {case: _finish(study) for case, study in same.items()},
-            {case: _compared(future.result()) for case, future in compared.items()},
+            {case: Compared(*future.result()) for case, future in compared.items()},
         )
 
 
@@ -59,8 +58,3 @@ def _published(study: Running) -> Study:
     found = _finish(study, **METHOD_PICTURES)
     study.publish(found)
     return found
-
-
-def _compared(result: tuple[Comparison, Picture, str]) -> Compared:
-    comparison, picture, run_id = result
-    return Compared(comparison, run_id, picture)

@@ -20,5 +20,5 @@ def forward(asked: Simulate) -> Simulated:
     name = title(str(asked.scene))
     with progress(1, f"{name} on {asked.engine}"):
         result = Simulated(*simulate(asked))
-    show_result(f"{name} on {asked.engine}", tables.of_motion(result.motion), result)
+    show_result(f"{name} on {asked.engine}", tables.of_motion(result.answer), result)
     return ended(result)

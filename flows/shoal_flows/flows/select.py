@@ -20,5 +20,5 @@ def select(asked: Select) -> Selected:
     what = f"{title(str(asked.scene))} within {asked.tolerance:g} m"
     with progress(1, what):
         result = Selected(*task(asked))
-    show_result(what, tables.of_selection(result.selection), result)
+    show_result(what, tables.of_selection(result.answer), result)
     return ended(result)

@@ -55,7 +55,7 @@ def optimise(cell: Cell, measurement: Measurement, study: str) -> Fit:
 
 
 @task(task_run_name="compare", cache_policy=NO_CACHE)
-def run_engines(asked: Compare) -> tuple[Comparison, Picture, str]:
+def run_engines(asked: Compare) -> tuple[Comparison, str, Picture]:
     """One scene on several engines; with its picture and the id of its run."""
     name = inputs.title(str(asked.scene))
     with events.work(f"{name} on {', '.join(asked.engines or ['several engines'])}"):
@@ -64,18 +64,18 @@ def run_engines(asked: Compare) -> tuple[Comparison, Picture, str]:
             comparison = remembered.run(key, jobs.answered, "compare", asked)
         marker = tip(list(comparison.scene.markers))
         picture = workers.run(pictures.draw_engines, comparison, marker)
-        return comparison, picture, tracked.log_comparison(comparison, picture[0])
+        return comparison, tracked.log_comparison(comparison, picture[0]), picture
 
 
 @task(task_run_name="simulate", cache_policy=NO_CACHE)
-def simulate(asked: Simulate) -> tuple[Scene, Trajectory, str]:
+def simulate(asked: Simulate) -> tuple[Trajectory, str, Scene]:
     """One motion, with the id of its run."""
     name = inputs.title(str(asked.scene))
     with events.work(f"{name} on {asked.engine}"):
         with or_failed("Forward", f"{name} · {asked.engine}", {"kind": "forward", "scene": name}):
             motion, wanted, selection = workers.run(jobs.simulated, asked)
         album = workers.run(pictures.moved, motion, wanted, selection)
-        return wanted, motion, tracked.log_forward(wanted, motion, album)
+        return motion, tracked.log_forward(wanted, motion, album), wanted
 
 
 @task(task_run_name="statics", cache_policy=NO_CACHE)

@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from jinja2 import PackageLoader
+from shoal.atomic_write import atomic_write
 from shoal.home import home
 from shoal.pictures.pages import environment, software
-from shoal.whole import whole
 from shoal_validation.nightly import history
 from shoal_validation.nightly.page import headline
 from shoal_validation.nightly.result import Night
@@ -43,7 +43,7 @@ def refresh() -> Path:
     """Write the page into the home; return where it lies. Raises InputError, ComputationError."""
     page = home() / "index.html"
     text = morning(time.time())
-    with whole(page) as part:
+    with atomic_write(page) as part:
         part.write_text(text, encoding="utf-8")
     return page
 

@@ -28,10 +28,7 @@ def statics(asked: Statics, as_json: bool, out: Out) -> None:
     scene = machine(asked, options.note)
     with screen.working(f"balancing {scene.name}"):
         equilibrium = statics.answer(asked.of(scene))
-    if out is not None:
-        files.equilibrium(equilibrium, out)
-    screen.show(equilibrium.to_json(), as_json, lambda: tables.equilibrium_table(equilibrium))
-    check_trusted(equilibrium.ok, equilibrium.message)
+    options.finish(equilibrium, as_json, out, files.equilibrium, tables.equilibrium_table)
 
 
 @command("modes")
@@ -49,10 +46,7 @@ def modes(asked: Modes, as_json: bool, out: Out) -> None:
     scene = machine(asked, options.note)
     with screen.working(f"modes of {scene.name}"):
         found = modes.answer(asked.of(scene))
-    if out is not None:
-        files.modes(found, out)
-    screen.show(found.to_json(), as_json, lambda: tables.modes_table(found))
-    check_trusted(found.ok, found.message)
+    options.finish(found, as_json, out, files.modes, tables.modes_table)
 
 
 @command("linearize")
@@ -70,10 +64,7 @@ def linearize(asked: Linearize, as_json: bool, out: Out) -> None:
     scene = machine(asked, options.note)
     with screen.working(f"linear model of {scene.name}"):
         found = linearize.answer(asked.of(scene))
-    if out is not None:
-        files.linear_model(found, out)
-    screen.show(found.to_json(), as_json, lambda: tables.linear_table(found))
-    check_trusted(found.ok, found.message)
+    options.finish(found, as_json, out, files.linear_model, tables.linear_table)
 
 
 @command("reactions")

@@ -55,10 +55,7 @@ def sweep(asked: Sweep, as_json: bool, out: Out) -> None:
     with screen.working(f"sweeping {scene.name}"):
         screen.compile_for(asked.engine, [1, 2], scene)
         result = sweep.answer(asked.of(scene))
-    if out is not None:
-        files.sweep(result, out)
-    screen.show(result.to_json(), as_json, lambda: tables.sweep_table(result))
-    check_trusted(result.ok, result.complaint)
+    options.finish(result, as_json, out, files.sweep, tables.sweep_table, result.complaint)
 
 
 @command("compare")
@@ -77,7 +74,4 @@ def compare(asked: Compare, as_json: bool, out: Out) -> None:
         for name in names:
             screen.compile_for(name, [1], scene)
         comparison = compare.answer(replace(asked.of(scene), engines=names))
-    if out is not None:
-        files.comparison(comparison, out)
-    screen.show(comparison.to_json(), as_json, lambda: tables.comparison_table(comparison))
-    check_trusted(comparison.ok, comparison.complaint)
+    options.finish(comparison, as_json, out, files.comparison, tables.comparison_table, comparison.complaint)

@@ -87,11 +87,11 @@ def import_scene(
     file: Path, partial: bool, root: Any, stated: tuple[str, ...], no_contacts: bool, out: Out, as_json: bool
 ) -> None:
     """Write the machine of FILE (URDF, SDF or MuJoCo's MJCF) as a scene. What became what is listed on stderr."""
+    from shoal.atomic_write import atomic_write
     from shoal.errors import InputError
     from shoal.imported import read
     from shoal.scene.edited import as_yaml
     from shoal.terminal import screen, tables
-    from shoal.whole import whole
 
     if wrong := next((one for one in stated if "=" not in one), None):
         raise InputError(f"--argument: must be NAME=VALUE, found {wrong[:40]!r}")
@@ -101,7 +101,7 @@ def import_scene(
         what = f"{found.missing[0]}{others} has no counterpart: the scene would be another machine"
         raise InputError(f"{file}: {what}; --partial writes the rest")
     path = out or Path(f"{found.scene['name']}.yaml")
-    with whole(path) as part:
+    with atomic_write(path) as part:
         part.write_text(as_yaml(found.scene), encoding="utf-8")
     report = {
         "status": "ok", "file": str(path), "rows": [one._asdict() for one in found.rows], "left_out": found.left_out,

@@ -61,10 +61,7 @@ def design(asked: Design, as_json: bool, out: Out) -> None:
 
     with screen.working(f"designing a measurement for {load_problem(str(asked.problem)).name}"):
         found = designed(asked, options.note)
-    if out is not None:
-        files.design(found, out)
-    screen.show(found.to_json(), as_json, lambda: tables.design_table(found))
-    check_trusted(found.ok, found.message)
+    options.finish(found, as_json, out, files.design, tables.design_table)
 
 
 @contextmanager

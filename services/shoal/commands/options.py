@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from shoal.errors import InputError
+from shoal.errors import InputError, check_trusted
 
 NEEDED = {".parquet": "pyarrow", ".nc": "xarray"}
 """Packages that a form of files asks for."""
@@ -30,6 +30,26 @@ def key_value(context: click.Context, parameter: click.Parameter, pairs: tuple[s
 def note(text: str) -> None:
     """Print a note on standard error."""
     click.echo(f"shoal: note: {text}", err=True)
+
+
+def finish(
+    answer: Any,
+    as_json: bool,
+    out: Out,
+    write: Callable[[Any, Path], None],
+    table: Callable[[Any], None],
+    reason: str | None = None,
+) -> None:
+    """Write an answer where it was asked for, print it as JSON or as a table, and end by whether it can be trusted.
+
+    reason: why it cannot be, else its message. Raises ComputationError.
+    """
+    from shoal.terminal import screen
+
+    if out is not None:
+        write(answer, out)
+    screen.show(answer.to_json(), as_json, lambda: table(answer))
+    check_trusted(answer.ok, answer.message if reason is None else reason)
 
 
 class EngineName(click.ParamType):  # type: ignore[type-arg]  # click 8.1 has none

@@ -4,19 +4,34 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from shoal.commands import options
 from shoal.commands.command import command
 from shoal.commands.options import Out
-from shoal.commands.stated import stated
 from shoal.errors import ComputationError, InputError, check_trusted
 
 if TYPE_CHECKING:
     from shoal.requests.uncertain import Uncertain
     from shoal.response import Response
+
+
+def stated(given: str) -> dict[str, Any]:
+    """Return the fields of a study (a name, or a file) by name; none of what is no study. Raises InputError."""
+    from shoal.response import stated as studies
+    from shoal.scene.load import read_yaml
+    from shoal.shelf import shelf
+
+    path = Path(given)
+    if path.suffix not in (".yaml", ".yml") or not path.is_file():
+        if shelf().find("scenes", given) is not None or studies.document_of(given) == given:
+            return {}
+        path = Path(studies.document_of(given))
+    text = path.read_text(encoding="utf-8")
+    data = read_yaml(text, given)
+    return studies.fields(text, path, given) if isinstance(data, dict) and studies.KEY in data else {}
 
 
 @command("uncertain", stated)
