@@ -24,20 +24,20 @@ def listening(listener: Listener) -> Iterator[None]:
 @contextmanager
 def work(name: str) -> Iterator[None]:
     """Announce that the block runs, and how it ended."""
-    _tell(name, "started")
+    _report(name, "started")
     try:
         yield
     except BaseException:
-        _tell(name, "failed")
+        _report(name, "failed")
         raise
-    _tell(name, "done")
+    _report(name, "done")
 
 
 def note(line: str) -> None:
     """Pass on a line that belongs to no work, or to what is within it."""
-    _tell(line, "note")
+    _report(line, "note")
 
 
-def _tell(name: str, what: str) -> None:
+def _report(name: str, what: str) -> None:
     for listener in _listeners:
         listener(name, what)

@@ -42,7 +42,7 @@ def reused() -> int:
 
 
 @contextmanager
-def anew() -> Iterator[None]:
+def recomputed() -> Iterator[None]:
     """Compute everything within the block."""
     global _fresh
     before, _fresh = _fresh, True

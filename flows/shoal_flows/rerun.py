@@ -81,7 +81,7 @@ def rerun(run_id: str) -> Repeated:
     with TemporaryDirectory() as folder:
         with answering():
             flow, parameters = _origin(client, known, Path(folder))
-        with remembered.anew():
+        with remembered.recomputed():
             # A text in quotes: `run_flow` reads texts as YAML.
             texts = {name: json.dumps(value) for name, value in parameters.items() if isinstance(value, str)}
             answer = run.run_flow(flow, {**parameters, **texts})

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from shoal.engines.pieces import joined, pieces
+from shoal.engines.sweep import joined, pieces
 from shoal.errors import ComputationError
 from shoal.requests.sweep import Sweep
 

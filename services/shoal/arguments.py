@@ -52,7 +52,7 @@ class Limit:
         if value is None:
             return None
         if not self.holds(value):
-            raise ValueError(f"needs {self}, found {told(value)}")
+            raise ValueError(f"needs {self}, found {brief(value)}")
         return int(value) if self.whole else float(value)
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
@@ -93,7 +93,7 @@ def check(**given: Any) -> None:
     """Arguments of `LIMITS` by name, None for those that are left out. Raises InputError that names the first wrong."""
     for name, value in given.items():
         if value is not None and not LIMITS[name].holds(value):
-            raise InputError(f"{name}: needs {LIMITS[name]}, found {told(value)}")
+            raise InputError(f"{name}: needs {LIMITS[name]}, found {brief(value)}")
 
 
 def check_apart(values: Any, varied: Iterable[str]) -> None:
@@ -103,19 +103,19 @@ def check_apart(values: Any, varied: Iterable[str]) -> None:
     """
     for path in varied:
         if isinstance(values, Mapping) and path in values:
-            raise InputError(f"{path}: is set to {told(values[path])} and varied as well; state one of the two")
+            raise InputError(f"{path}: is set to {brief(values[path])} and varied as well; state one of the two")
 
 
 def one_of(name: str, value: Any, known: tuple[str, ...]) -> None:
     """Raises InputError where a value is none of the names there are."""
     if value not in known:
-        raise InputError(f"{name}: needs one of {', '.join(known)}, found {told(value)}")
+        raise InputError(f"{name}: needs one of {', '.join(known)}, found {brief(value)}")
 
 
 def mapping(name: str, given: Any, what: str) -> Mapping[Any, Any]:
     """A mapping of one or more entries. Raises InputError; what: they are, in words."""
     if not isinstance(given, Mapping) or not given:
-        raise InputError(f"{name}: needs a mapping of one or more {what}, found {told(given)}")
+        raise InputError(f"{name}: needs a mapping of one or more {what}, found {brief(given)}")
     return given
 
 
@@ -129,11 +129,11 @@ def numbers(name: str, given: Any, what: str = "numbers") -> npt.NDArray[np.floa
         found = np.array(given, dtype=object)
     right = found.ndim == 1 and found.size > 0 and found.dtype.kind in "iuf" and not np.ma.is_masked(given)
     if not (right and np.isfinite(found).all()):
-        raise InputError(f"{name}: needs a list of one or more finite {what}, found {told(given)}")
+        raise InputError(f"{name}: needs a list of one or more finite {what}, found {brief(given)}")
     return found.astype(float)
 
 
-def told(value: Any) -> str:
-    """A value in a message: one line, not a long one."""
+def brief(value: Any) -> str:
+    """Return a value as a message shows it: its `repr` in one short line."""
     text = " ".join(repr(value.tolist() if hasattr(value, "tolist") else value).split())
     return text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."

@@ -16,7 +16,7 @@ import numpy as np
 import orjson
 
 from shoal import notebook
-from shoal.arguments import told
+from shoal.arguments import brief
 from shoal.engines.remote import RemoteEngine
 from shoal.errors import ComputationError, InputError
 from shoal.identification import Estimate
@@ -225,7 +225,7 @@ def _recording(source: FileSource, given: Any, channels: tuple[Channel, ...] | N
     frames = None
     if not isinstance(given, str | Path):
         if not hasattr(given, "columns"):
-            raise InputError(f"data: needs a file or a table (a DataFrame), by name for several, found {told(given)}")
+            raise InputError(f"data: needs a file or a table (a DataFrame), by name for several, found {brief(given)}")
         columns = {str(name): given[name].to_numpy(dtype=float) for name in given.columns}
     elif isinstance(given, str) and NAME.fullmatch(given.partition("@")[0]) and not Path(given).exists():
         return source.model_dump(mode="json", exclude_unset=True, exclude={"path"}), given

@@ -11,7 +11,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, cast
 
-from shoal.arguments import told
+from shoal.arguments import brief
 from shoal.errors import InputError
 from shoal.requests.compare import Compare
 from shoal.requests.design import Design as DesignRequest
@@ -449,7 +449,7 @@ def _file(data: Any, table: Path) -> str:
     if isinstance(data, str | Path):
         return str(data)
     if not hasattr(data, "to_csv"):
-        raise InputError(f"data: needs a file or a table (a DataFrame), by name for several, found {told(data)}")
+        raise InputError(f"data: needs a file or a table (a DataFrame), by name for several, found {brief(data)}")
     data.to_csv(table, index=False)
     return str(table)
 

@@ -20,7 +20,7 @@ from running import eventually, serving
 from scipy import stats
 from shoal.api.operations import OPERATIONS
 from shoal.api.settings import Settings
-from shoal.api.tasks import told
+from shoal.api.tasks import reported
 from shoal.client import Client
 from shoal.engines.sweep import Sweep
 from shoal.errors import ComputationError, InputError
@@ -116,7 +116,7 @@ def test_the_answer_is_the_librarys(client: Client, name: str) -> None:
     arguments, options = CALLS[name]
     far, near = (getattr(place, name)(*arguments, **options) for place in (client, shoal))
     assert not list(differ(near, far))
-    place = plain(told(far)) if name != "simulate" else far.model
+    place = plain(reported(far)) if name != "simulate" else far.model
     for key in ERRORS[name]:
         place = place[int(key)] if key.isdigit() else place[key]
     assert place is not None
@@ -128,7 +128,7 @@ def test_without_the_client_it_is_what_the_command_prints(gauss: httpx.Client, n
     arguments, options = CALLS[name]
     asked = {**signature(getattr(shoal, name)).bind(*arguments, **options).arguments}
     answer = gauss.post(f"/v1/{name}", content=orjson.dumps(asked, option=orjson.OPT_SERIALIZE_NUMPY), headers=JSON)
-    assert known(answer.json()) == known(plain(told(getattr(shoal, name)(*arguments, **options))))
+    assert known(answer.json()) == known(plain(reported(getattr(shoal, name)(*arguments, **options))))
 
 
 def test_what_is_uncertain_is_said_in_every_way_of_the_library(client: Client) -> None:

@@ -9,7 +9,7 @@ import pytest
 import shoal
 from scipy.integrate import quad, solve_ivp
 from scipy.special import ellipj, ellipk
-from shoal.engines.event_words import compare
+from shoal.engines.event_comparison import compare
 from shoal.scene import Scene
 
 DOWN, HIGH = -np.pi / 2, np.pi / 3

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from shoal.engines import get_engine
-from shoal.engines.pieces import joined, pieces
-from shoal.engines.sweep import sweep
+from shoal.engines.sweep import joined, pieces, sweep
 from shoal.scene import load_scene
 
 

@@ -20,7 +20,7 @@ FIRST = "paper-case-1, least-squares · seed 0"
 
 @pytest.fixture
 def nothing_kept() -> Iterator[None]:
-    with remembered.anew():
+    with remembered.recomputed():
         yield
 
 

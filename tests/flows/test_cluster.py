@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 from deployed import free_port, of_home
-from shoal.engines.pieces import joined, pieces
+from shoal.engines.sweep import joined, pieces
 from shoal.errors import ComputationError, InputError
 from shoal.requests.sweep import Sweep
 from shoal_flows import cluster, jobs, workers

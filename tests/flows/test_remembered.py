@@ -67,7 +67,7 @@ def test_a_killed_study_goes_on_where_it_was(computed: list[Any], measurement: M
 
     found = fits(measurement)
     assert [cell.seed for cell in computed] == list(SEEDS[len(kept) :])
-    with remembered.anew():
+    with remembered.recomputed():
         undisturbed = fits(measurement)
     assert len(computed) == 4 - len(kept) + 4
     for one, other in zip(found, undisturbed, strict=True):

@@ -10,8 +10,7 @@ from typing import Any, cast
 from prefect import task
 from prefect.cache_policies import NO_CACHE
 from shoal.engines.compare import Comparison
-from shoal.engines.pieces import joined, pieces
-from shoal.engines.sweep import Sweep
+from shoal.engines.sweep import Sweep, joined, pieces
 from shoal.identification import Measurement
 from shoal.identification.design import Design
 from shoal.mechanics.analysis.equilibrium import Equilibrium

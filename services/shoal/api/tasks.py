@@ -114,10 +114,10 @@ def _computed(bench: Bench, name: str, arguments: dict[str, Any], request: Reque
     if follows := request.follows:
         arguments = {**arguments, "progress": lambda *row: note(dict(zip(follows, row, strict=True)))}
     found = function(**arguments)
-    return to_json(packed(found) if request.objects else plain(told(found)))
+    return to_json(packed(found) if request.objects else plain(reported(found)))
 
 
-def told(found: Any) -> Any:
+def reported(found: Any) -> Any:
     """A result as the command line prints it with --json."""
     if isinstance(found, list):
         return reactions_to_json(found)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from shoal.arguments import told
+from shoal.arguments import brief
 from shoal.engines import get_engine
 from shoal.engines.capabilities import able
 from shoal.engines.gauss import GaussEngine
@@ -114,7 +114,7 @@ def compare(
     Raises InputError for an unknown engine, or if the scene suits none.
     """
     if engines is not None and (isinstance(engines, str) or not engines):
-        raise InputError(f"engines: needs a list of one or more names, found {told(engines)}")
+        raise InputError(f"engines: needs a list of one or more names, found {brief(engines)}")
     chosen = {name: get_engine(name) for name in (compared(scene) if engines is None else engines)}
     trajectories: dict[str, Trajectory] = {}
     refused: dict[str, str] = {}

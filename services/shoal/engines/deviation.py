@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from shoal.engines.event_words import EventComparison, compare
+from shoal.engines.event_comparison import EventComparison, compare
 from shoal.scene import Scene
 from shoal.trajectory import Array, Trajectory
 

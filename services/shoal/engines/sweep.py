@@ -225,3 +225,33 @@ def _gone_on(engine: Engine, scene: Scene, grid: Mapping[str, Array], found: Tra
             left = left[[one is not Status.OK for one in run.status]]
     wall_s = found.wall_s + time.perf_counter() - started
     return replace(found, points=points, lane_findings=findings, wall_s=wall_s, changes=tuple(changes))
+
+
+_PIECES = 4
+"""Pieces of a grid for each worker."""
+_SMALLEST = 64
+"""Points below which a piece is not worth its message."""
+
+
+def pieces(vary: Mapping[str, Array], workers: int) -> list[dict[str, Array]]:
+    """A grid (path -> values) cut along its first axis so that no worker waits long for another."""
+    first, *others = vary
+    points = int(np.prod([values.size for values in vary.values()]))
+    count = min(vary[first].size, _PIECES * workers, -(-points // _SMALLEST))
+    return [{first: part, **{path: vary[path] for path in others}} for part in np.array_split(vary[first], count)]
+
+
+def joined(parts: Sequence[Sweep]) -> Sweep:
+    """The pieces of a grid, in their order, as the whole; the time is the sum."""
+    return replace(
+        parts[0],
+        grid=_stacked([part.grid for part in parts]),
+        positions=_stacked([part.positions for part in parts]),
+        displacements=_stacked([part.displacements for part in parts]),
+        status=tuple(status for part in parts for status in part.status),
+        wall_s=sum(part.wall_s for part in parts),
+    )
+
+
+def _stacked(columns: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
+    return {name: np.concatenate([column[name] for column in columns]) for name in columns[0]}

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from shoal.engines.deviation import Deviation
-from shoal.engines.event_words import Event
+from shoal.engines.event_comparison import Event
 from shoal.mechanics.event_record import place_of
 from shoal.mechanics.gap_history import GapHistory, follow, instants
 from shoal.trajectory import Array

@@ -17,7 +17,7 @@ import numpy as np
 
 from shoal.engines.contract import Engine
 from shoal.engines.deviation import Deviation
-from shoal.engines.event_words import Event, EventComparison
+from shoal.engines.event_comparison import Event, EventComparison
 from shoal.engines.gauss import GaussEngine
 from shoal.engines.roundings import sensitive
 from shoal.engines.sources import SOURCES, WRONG, Examined, Outcome, Rejected

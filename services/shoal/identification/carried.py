@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from shoal.arguments import told
+from shoal.arguments import brief
 from shoal.errors import InputError
 from shoal.read_estimate import checked_joint, read_estimate
 from shoal.scene import expression
@@ -216,7 +216,7 @@ def carried(found: Estimate | Path | str) -> Carried:
         return read_values(found)
     if not isinstance(found, Estimate):
         raise InputError(
-            f"values: needs fields of a scene by path, an estimate or the JSON file of one, found {told(found)}"
+            f"values: needs fields of a scene by path, an estimate or the JSON file of one, found {brief(found)}"
         )
     return of_estimate(found)
 

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
-from shoal.arguments import told
+from shoal.arguments import brief
 from shoal.errors import InputError
 from shoal.identification.bounds import accepts, possible_bound
 from shoal.identification.recording.source import IN_SPACE, Channel, EngineSource, FileSource, Source
@@ -358,7 +358,7 @@ def as_problem(given: Problem | Mapping[str, Any] | str | Path) -> Problem:
         return Problem.parse(unwrapped(given), "problem")
     if not isinstance(given, str | Path):
         raise InputError(
-            f"problem: needs a problem, its fields, a name or the path of a YAML file, found {told(given)}"
+            f"problem: needs a problem, its fields, a name or the path of a YAML file, found {brief(given)}"
         )
     return load_problem(given)
 
@@ -385,15 +385,17 @@ def load_problem(name: str | Path) -> Problem:
     if not Path(name).suffix:
         return problem
     folder = Path(name).parent
-    changes: dict[str, Any] = {"recordings": {key: _beside(folder, one) for key, one in problem.recordings.items()}}
+    changes: dict[str, Any] = {
+        "recordings": {key: _from_folder(folder, one) for key, one in problem.recordings.items()}
+    }
     if problem.source is not None:
-        changes["source"] = _beside(folder, problem.source)
+        changes["source"] = _from_folder(folder, problem.source)
     if Path(problem.scene).suffix and (folder / problem.scene).exists():
         changes["scene"] = str(folder / problem.scene)
     return problem.model_copy(update=changes)
 
 
-def _beside(folder: Path, source: EngineSource | FileSource) -> EngineSource | FileSource:
+def _from_folder(folder: Path, source: EngineSource | FileSource) -> EngineSource | FileSource:
     """The source with a path that starts from the folder of the YAML file that names it, unless it is a name."""
     if isinstance(source, EngineSource) or source.path is None:
         return source

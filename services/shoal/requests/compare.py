@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import BeforeValidator
 from pydantic.dataclasses import dataclass
 
-from shoal.arguments import told
+from shoal.arguments import brief
 from shoal.requests.fields import At, OfScene, Verify
 from shoal.requests.option import Option
 from shoal.requests.request import STRICT
@@ -22,7 +22,7 @@ _ENGINES = "Who simulates, two or more; else Shoal's own solver and at most two 
 def _names(given: Any) -> Any:
     if given is None or (isinstance(given, list | tuple) and given):
         return given
-    raise ValueError(f"needs a list of one or more names, found {told(given)}")
+    raise ValueError(f"needs a list of one or more names, found {brief(given)}")
 
 
 def _split(given: Any) -> Any:

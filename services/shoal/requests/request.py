@@ -11,7 +11,7 @@ from typing import Annotated, Any, NoReturn, TypeVar, get_args, get_origin
 from pydantic import ConfigDict, ValidationError
 from pydantic_core import PydanticCustomError, PydanticUndefined
 
-from shoal.arguments import Limit, told
+from shoal.arguments import Limit, brief
 from shoal.errors import InputError
 from shoal.requests.option import Front, Option
 
@@ -134,7 +134,7 @@ def _line(error: ValidationError, request: Any, named: Callable[[str], str]) -> 
     every = error.errors()
     first = next((one for one in every if one["type"] == "unexpected_keyword_argument"), every[0])
     where = [str(part) for part in first["loc"]] or [str(first["ctx"]["field"])]
-    name, found = where[0], told(first["input"])
+    name, found = where[0], brief(first["input"])
     head = ": ".join([named(name), *where[1:2]])
     if first["type"] == "unexpected_keyword_argument":
         near = get_close_matches(name, fields(request), 1)

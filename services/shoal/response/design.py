@@ -42,7 +42,7 @@ def box_places(inputs: Inputs, count: int, seed: int) -> Array:
     return np.concatenate(found)
 
 
-def telling(inputs: Inputs, xi: Array, terms: Terms, count: int, places: Array) -> Array:
+def informative_places(inputs: Inputs, xi: Array, terms: Terms, count: int, places: Array) -> Array:
     """Choose places that determine the terms best beside the runs at `xi`, (count, parameters)."""
     known = inputs.basis(xi, terms)
     factor = np.linalg.cholesky(known.T @ known + UNKNOWN * np.eye(len(terms)))
@@ -69,7 +69,7 @@ def box_design(inputs: Inputs, xi: Array, terms: Terms, count: int, seed: int) -
     apart = np.full(len(places), np.inf)
     for known in xi:
         apart = np.minimum(apart, np.abs(places - known).max(axis=1))
-    return telling(inputs, xi, terms, count, places[apart > APART])
+    return informative_places(inputs, xi, terms, count, places[apart > APART])
 
 
 MOST_ACTIVE = 10

@@ -16,7 +16,7 @@ from shoal.findings import Concluded, Finding
 from shoal.json_values import plain
 from shoal.response.allocation import Allocation
 from shoal.response.enclosure import Bounds, unseen
-from shoal.response.event_words import EventWords
+from shoal.response.event_shares import EventShares
 from shoal.response.findings import ResponseStatus, status_of
 from shoal.response.inputs import Inputs
 from shoal.response.limits import LimitResult
@@ -77,7 +77,7 @@ class Response(Concluded):
     finer: Finer | None = None
     controls: int = 0
     elsewhere: Elsewhere | None = None
-    words: EventWords | None = None
+    words: EventShares | None = None
 
     @property
     def status(self) -> ResponseStatus:

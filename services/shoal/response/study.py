@@ -102,7 +102,7 @@ class Study:
         np.maximum.at(size, self.groups, np.abs(values).max(axis=0))
         return np.where(largest > ROUNDING * size, largest, 0.0)[self.groups]
 
-    def beside(self, error: Array) -> Array:
+    def with_neighbours(self, error: Array) -> Array:
         """The largest of each instant and its neighbours in the same group, (columns,).
 
         Where runs happen to be predicted well, others need not be.

@@ -10,7 +10,7 @@ from shoal.requests.uncertain import Uncertain
 from shoal.response.allocate import allocate
 from shoal.response.assess import allow_for_limits, assess_limits
 from shoal.response.conclusions import findings_about, withheld
-from shoal.response.event_words import event_words
+from shoal.response.event_shares import event_shares
 from shoal.response.problem import read
 from shoal.response.respond import respond_markers
 from shoal.response.result import Response
@@ -60,7 +60,7 @@ def uncertain(asked: Uncertain, scene: Scene) -> Response:
         finer=finer,
         controls=found.runs.controls,
         elsewhere=problem.starts.elsewhere,
-        words=event_words(problem.model, found),
+        words=event_shares(problem.model, found),
     )
     findings = findings_about(response, problem, found, known) + missed
     return withheld(replace(response, findings=findings))

@@ -14,7 +14,7 @@ from typing import Any
 
 import yaml
 
-from shoal.arguments import told
+from shoal.arguments import brief
 from shoal.errors import InputError
 from shoal.scene.ended import with_end
 from shoal.scene.measured import with_signals
@@ -198,7 +198,7 @@ def as_scene(given: Scene | Mapping[str, Any] | str | Path) -> Scene:
     if isinstance(given, Mapping):
         return _parsed(unwrapped(given), Path(), "scene")
     if not isinstance(given, str | Path):
-        raise InputError(f"scene: needs a scene, its fields, a name or the path of a YAML file, found {told(given)}")
+        raise InputError(f"scene: needs a scene, its fields, a name or the path of a YAML file, found {brief(given)}")
     return load_scene(given)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from shoal.arguments import told
+from shoal.arguments import brief
 from shoal.errors import InputError
 from shoal.scene.function import Function
 from shoal.scene.initial import Begin, InitialState
@@ -30,7 +30,7 @@ def unwrapped(value: Any) -> Any:
     """A value of a field with numbers and lists of Python in place of numpy's. Raises InputError for masked ones."""
     if isinstance(value, np.ndarray | np.generic):
         if np.ma.is_masked(value):
-            raise InputError(f"values: a masked array is no value of a field, found {told(value)}")
+            raise InputError(f"values: a masked array is no value of a field, found {brief(value)}")
         return value.tolist()
     if isinstance(value, Mapping):
         return {name: unwrapped(one) for name, one in value.items()}

@@ -81,13 +81,13 @@ def _by_parts(study: Study, method: str, parts: Parts) -> Found:
         seen.follow(missing(study, seen, terms))
     except UnsuitableError as error:
         raise InputError(f"method: {method}: {error}") from None
-    told = np.stack([_told(seen.times, course, study.when, parts) for course in seen.courses])
+    told = np.stack([_at_instants(seen.times, course, study.when, parts) for course in seen.courses])
     made = len(told)
     found = fit(study.inputs, np.array(seen.xi), told.reshape(made, -1), terms)
     return Found(f"amplitude and phase as polynomials of degree {degree}, of {made} runs", Parted(found, told.shape[1]))
 
 
-def _told(times: Array, course: Array, when: Array, parts: Parts) -> Array:
+def _at_instants(times: Array, course: Array, when: Array, parts: Parts) -> Array:
     """Return the parts of a course at the instants, (parts, 3, columns)."""
     of = [parts(times, signal) for signal in course.T]
     at = [make_interp_spline(times, one, 3, axis=-1)(when) for one in of]

@@ -17,7 +17,7 @@ import math
 from itertools import product
 
 import numpy as np
-from shoal.response.design import telling
+from shoal.response.design import informative_places
 from shoal.response.expansion import fit
 from shoal.response.polynomials import Terms, size, tensor, total_degree
 from shoal.response.study import Plan, Study
@@ -57,7 +57,7 @@ def chebyshev_total(study: Study) -> Plan:
     else:
         candidates = np.unique(np.random.default_rng(study.seed).choice(zeros, (CANDIDATES, parameters)), axis=0)
     count = min(math.ceil(SHARE * len(terms)), len(candidates))
-    places = telling(study.inputs, np.zeros((1, parameters)), terms, count, candidates)
+    places = informative_places(study.inputs, np.zeros((1, parameters)), terms, count, candidates)
     return _plan(places, terms, f"polynomials of total degree {degree} fitted at {count} of Chebyshev's zeros")
 
 

@@ -257,7 +257,7 @@ def normal_terms() -> Reached:
 
     growth = math.exp(0.09)
     mean, std = 1 + math.exp(0.045), math.sqrt(4 + growth * (growth - 1) + 0.15)
-    answer = _told(function, 8, Normal(0.0, 1.0))
+    answer = _response(function, 8, Normal(0.0, 1.0))
     found = answer.statistics
     assert found is not None
     off = max(abs(found.mean[0] - mean), abs(found.std[0] - std)) / std
@@ -278,7 +278,7 @@ def indices() -> Iterator[Reached]:
     def ishigami(v: Mapping[str, Array]) -> Array:
         return np.asarray(np.sin(v["x0"]) + 7 * np.sin(v["x1"]) ** 2 + 0.1 * v["x2"] ** 4 * np.sin(v["x0"]))
 
-    told = _told(ishigami, 3, Uniform(-math.pi, math.pi))
+    told = _response(ishigami, 3, Uniform(-math.pi, math.pi))
     yield _indices("Ishigami's function", told, np.array([[one, other, 0.0], [one + both, other, both]]))
     weights = np.array([0.0, 1.0, 4.5, 9.0])
     partial = 1 / (3 * (1 + weights) ** 2)
@@ -288,10 +288,10 @@ def indices() -> Iterator[Reached]:
 
     whole = np.prod(1 + partial)
     exact = np.array([partial, partial * whole / (1 + partial)]) / (whole - 1)
-    yield _indices("the g-function", _told(kinked, 4, Uniform(0.0, 1.0)), exact)
+    yield _indices("the g-function", _response(kinked, 4, Uniform(0.0, 1.0)), exact)
 
 
-def _told(function: Callable[[Mapping[str, Array]], Array], count: int, of: Normal | Uniform) -> ModelResponse:
+def _response(function: Callable[[Mapping[str, Array]], Array], count: int, of: Normal | Uniform) -> ModelResponse:
     """By `auto`."""
 
     def model(values: Mapping[str, Array]) -> Answers:

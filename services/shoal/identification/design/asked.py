@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from shoal.arguments import Limit, told
+from shoal.arguments import Limit, brief
 from shoal.errors import InputError
 from shoal.identification.problem import Problem
 from shoal.identification.recording.measurement import Measurement
@@ -52,7 +52,7 @@ def stated_noise(
     named |= {f"sensor_noise.{kind}": (kind, size) for kind, size in (sensors or {}).items()}
     for what, (_, size) in named.items():
         if size is not None and not _POSITIVE.holds(size):
-            raise InputError(f"{what}: {told(size)} is no standard deviation; it is positive")
+            raise InputError(f"{what}: {brief(size)} is no standard deviation; it is positive")
     found = {kind: size for kind, size in named.values() if size is not None}
     channels = problem.channels_of(source)
     for channel in channels:

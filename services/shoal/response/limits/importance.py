@@ -111,7 +111,7 @@ class Mixture:
     outside: list[Outside]
     wide: tuple[float, ...]
 
-    def beside(self, other: Mixture, share: float) -> Mixture:
+    def mixed_with(self, other: Mixture, share: float) -> Mixture:
         """The normal distributions of both, of which those of the other have this share."""
         return replace(
             self,
@@ -260,7 +260,7 @@ def adapted(points: list[DesignPoint], found: Sequence[Sample], judge: Sample | 
         fitted.sort(key=lambda one: _scatter(one, judge.beyond))
     best = fitted[0]
     for one in fitted[1:]:
-        best = best.beside(one, OTHERS / (len(fitted) - 1))
+        best = best.mixed_with(one, OTHERS / (len(fitted) - 1))
     return best
 
 
@@ -323,4 +323,4 @@ def _fitted(plain: Mixture, beyond: Sample, parts: int, prior: float) -> Mixture
     if not means:
         return plain
     fitted = replace(plain, shares=np.array(shares) / sum(shares), means=np.array(means), factors=np.array(factors))
-    return plain.beside(fitted, 1 - PLAIN)
+    return plain.mixed_with(fitted, 1 - PLAIN)

@@ -136,7 +136,7 @@ _BODY = "moved-body-"
 
 
 @dataclass(frozen=True)
-class Telling(GaussEngine):
+class StatefulGauss(GaussEngine):
     """The native engine, whose trajectories hold their states."""
 
     def simulate(self, scene: Scene, times: Sequence[float] | Array | None = None, *, whole: bool = True) -> Trajectory:
@@ -163,7 +163,7 @@ def engine_for(engine: Engine, scene: Scene, quantity: str) -> Engine:
         raise InputError(
             f"limit: {quantity} of this machine is computed by the engine gauss alone; found {engine.name}"
         )
-    return Telling(engine.threads)
+    return StatefulGauss(engine.threads)
 
 
 def with_bodies(scene: Scene, quantity: str) -> Scene:

@@ -68,7 +68,7 @@ def bounds(study: Study) -> Found:
         surprising = contradicts(study, missed, here.error) & (study.instants < horizon(study, here.gap))
         here = replace(here, enclosed=with_controls(study, here.enclosed))
         if surprising.any():
-            here = replace(here, error=study.beside(np.maximum(here.error, missed)), enclosed=None)
+            here = replace(here, error=study.with_neighbours(np.maximum(here.error, missed)), enclosed=None)
             here, _ = _grown(plan, _round(plan, degree, here.decay), degree)
     top = int(here.surrogate.terms.sum(axis=1).max())
     kind = "regularised " if len(here.surrogate.terms) > len(runs.xi) / PER_TERM else ""
@@ -179,7 +179,7 @@ def _round(plan: Screened, degree: int, before: Decay | None = None) -> StudySta
         runs(study.inputs.sobol(parameters + 1, study.seed + 1, runs.evaluations))
     error = np.abs(surrogate(runs.xi[made:]) - runs.values[made:]).max(axis=0, initial=0.0)
     # New runs lie where the polynomial is known best; those left out of the fit lie everywhere.
-    error = study.beside(np.maximum(error, surrogate.left_out))
+    error = study.with_neighbours(np.maximum(error, surrogate.left_out))
     if _carried(plan, degree):
         # The new runs make the polynomial better; its error is what it was without them.
         surrogate = _with_more_terms(plan, _fit_columns(plan, degree), decay)

@@ -15,7 +15,7 @@ import numpy as np
 
 from shoal.identification.conventions import HARDLY
 from shoal.identification.diagnostics.minima.other_starts import turned
-from shoal.identification.diagnostics.minima.rivals import apart, beside_samples, turn_of_samples
+from shoal.identification.diagnostics.minima.rivals import apart, between_samples, turn_of_samples
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods.auto import explained
 from shoal.identification.methods.lanes import DESCENTS, Descent, descend_many, differentiate_many, distinct
@@ -100,7 +100,7 @@ def _unresolved(model: ForwardModel, point: Array, k: int) -> bool:
     ends = [np.linspace(point[k], end, _LOOKS + 1)[1:] for end in (model.lower[k], model.upper[k])]
     points = _line(point, k, np.concatenate([point[k : k + 1], *ends]))
     for name in model.measurement.recordings:
-        at, straight, between = (seen[1:] - seen[0] for seen in beside_samples(model, points, name))
+        at, straight, between = (seen[1:] - seen[0] for seen in between_samples(model, points, name))
         off, size = np.mean((between - straight) ** 2, axis=1), np.var(at, axis=1)
         if np.any(off > _UNRESOLVED**2 * size):  # nan where a motion failed
             return True

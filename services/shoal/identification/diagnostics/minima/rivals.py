@@ -156,7 +156,7 @@ def _usual(steps: Array) -> float:
     return float(np.median(steps[steps < 1.5 * np.min(steps)]))
 
 
-def beside_samples(model: ForwardModel, points: Array, name: str) -> tuple[Array, Array, Array]:
+def between_samples(model: ForwardModel, points: Array, name: str) -> tuple[Array, Array, Array]:
     """Channels of a recording over their spread where no samples are missing, (points, instants * channels) each.
 
     At the first of two samples, and a part of the way to the next: on the straight line, and by the motion itself. The
@@ -188,7 +188,7 @@ def same_at_samples(model: ForwardModel, one: Array, other: Array) -> bool:
     """Return whether two motions that fit alike at the samples are apart between them: by whole turns or swings."""
     aside = model.aside()
     for name in model.measurement.recordings:
-        at, _, between = beside_samples(aside, np.array([one, other]), name)
+        at, _, between = between_samples(aside, np.array([one, other]), name)
         off, apart_by = (float(np.mean((seen[1] - seen[0]) ** 2)) for seen in (at, between))
         if apart_by > max(_BETWEEN * off, _SEEN):
             return True

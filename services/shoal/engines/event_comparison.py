@@ -32,7 +32,7 @@ class EventComparison:
 
     @property
     def until(self) -> float:
-        """Where the words part [s]; infinite of equal words."""
+        """Instant at which the words part [s]; infinite of equal words."""
         return min((event["time"] for event in self.differs if event is not None), default=np.inf)
 
     @property

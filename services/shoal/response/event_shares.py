@@ -21,7 +21,7 @@ LISTED = 4
 
 
 @dataclass(frozen=True)
-class EventWord:
+class EventShare:
     """events: of contacts until the last instant, in order; share: of the probability or the box; runs: that had it."""
 
     events: str
@@ -34,10 +34,10 @@ class EventWord:
 
 
 @dataclass(frozen=True)
-class EventWords:
+class EventShares:
     """Words of events of all runs, the most frequent first; rare: share that a word may have which no run met."""
 
-    words: tuple[EventWord, ...]
+    words: tuple[EventShare, ...]
     rare: float
 
     @property
@@ -48,7 +48,7 @@ class EventWords:
         return "; ".join([*named, *more])
 
 
-def event_words(model: ResponseModel, found: ModelResponse) -> EventWords | None:
+def event_shares(model: ResponseModel, found: ModelResponse) -> EventShares | None:
     """Return the words of the runs of a study; None where all have the same, or no contacts."""
     runs = found.runs
     if runs.words is None or len(runs.words) != len(runs.xi):
@@ -65,5 +65,5 @@ def event_words(model: ResponseModel, found: ModelResponse) -> EventWords | None
         shares, tested = np.array([np.mean(last[nearest] == name) for name in names]), FIRST * (1 + len(runs.inputs))
     order = np.argsort(-shares, kind="stable")
     texts = [model.texts.get(name, "?") if name else "" for name in names.tolist()]
-    words = (EventWord(texts[k], float(shares[k]), int(counts[k])) for k in order)
-    return EventWords(tuple(words), unseen(tested))
+    words = (EventShare(texts[k], float(shares[k]), int(counts[k])) for k in order)
+    return EventShares(tuple(words), unseen(tested))
