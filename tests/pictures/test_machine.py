@@ -17,6 +17,7 @@ from shoal.errors import InputError
 from shoal.pictures.emphasis import Emphasis
 from shoal.pictures.machine import shapes
 from shoal.pictures.machine.drawing import Symbol
+from shoal.pictures.machine.ropes import span
 from shoal.pictures.machine.sheet import unit_of
 from shoal.pictures.motion import DrawnMotion, plain_motion, scene_motion
 from shoal.pictures.poses import poses
@@ -279,3 +280,25 @@ def test_emphasis_of_nothing_is_refused(tmp_path: Path) -> None:
     unknown = Scene.parse(cantilever(width=None, density=None, youngs_modulus=None, **numbers))
     with pytest.raises(InputError, match="stress: no rod of cantilever has a stress that is known"):
         scene_motion(unknown, get_engine("gauss"), 1e-4, 2, Emphasis(stress=True))
+
+
+def test_spans_of_a_rope_touch_its_pulleys() -> None:
+    """Of an Atwood machine they hang straight; between two wheels they touch each on its side."""
+    scene = {
+        "name": "atwood",
+        "bodies": {"a": {"kind": "point-mass", "mass": 1.0}, "b": {"kind": "point-mass", "mass": 1.2}},
+        "joints": {"rope": {"kind": "rope", "first": {"body": "a"}, "second": {"body": "b"},
+                            "over": [{"body": "ground", "point": [0.0, 0.0], "radius": 0.2, "side": "right"}]}},
+        "markers": {"a": {"body": "a"}}, "initial": {"a": {"position": [-0.2, -1.0]}, "b": {"position": [0.2, -1.0]}},
+    }  # fmt: skip
+    found = moving(scene, 0.3)
+    for number, x in enumerate((-0.2, 0.2)):
+        np.testing.assert_allclose(path(found, "rope", "rope", number)[..., 0], x, atol=1e-9)
+    one, other = np.array([[0.0, 0.0]]), np.array([[1.0, 0.5]])
+    for radii in ((0.2, 0.1), (0.2, -0.1), (-0.3, 0.2)):
+        begin, end = span(one, other, radii)
+        way = (end - begin)[0]
+        for centre, place, radius in ((one, begin, radii[0]), (other, end, radii[1])):
+            away = (centre - place)[0]
+            assert away @ way == pytest.approx(0.0, abs=1e-12)
+            assert way[0] * away[1] - way[1] * away[0] == pytest.approx(radius * np.linalg.norm(way))

@@ -126,8 +126,8 @@ def put(axes: Axes, stroke: Stroke, frame: int, alpha: float = 1.0) -> list[Arti
             one = Line2D(*line.T, color=tint or look["edge"], linewidth=width, alpha=alpha, zorder=order)
             axes.add_line(one)
         else:
-            colours = {"facecolor": tint or look["fill"], "edgecolor": tint or look["edge"]}
-            one = Polygon(line, **colours, linewidth=width, alpha=alpha, zorder=order)
+            inside, edge = tint or look["fill"], tint or look["edge"]
+            one = Polygon(line, facecolor=inside, edgecolor=edge, linewidth=width, alpha=alpha, zorder=order)
             axes.add_patch(one)
         made.append(one)
     return made

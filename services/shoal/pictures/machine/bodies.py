@@ -16,6 +16,7 @@ from shoal.pictures.machine.sheet import Part, Sheet
 from shoal.pictures.outline import joined_places
 from shoal.scene import Attachment, PointMass, RigidBody, Rod
 from shoal.scene.joints import Gear, Slider
+from shoal.scene.ropes import Rope
 from shoal.trajectory import Array
 
 _ALONG = 33
@@ -34,6 +35,8 @@ def bodies(marks: Marks) -> Iterator[Part]:
     wheels = {
         side.body for joint in scene.joints.values() if isinstance(joint, Gear) for side in (joint.first, joint.second)
     }
+    for rope in (joint for joint in scene.joints.values() if isinstance(joint, Rope)):
+        wheels |= {drum.body for drum in (rope.first, *rope.over, rope.second) if np.any(drum.radius)}
     for name, body in scene.bodies.items():
         if isinstance(body, Rod):
             if body.element == "rigid":

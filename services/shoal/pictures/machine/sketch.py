@@ -15,6 +15,7 @@ from shoal.pictures.machine.gears import gears
 from shoal.pictures.machine.joints import joints
 from shoal.pictures.machine.loads import loads
 from shoal.pictures.machine.marks import Marks
+from shoal.pictures.machine.ropes import ropes
 from shoal.pictures.machine.sheet import Part, Sheet, unit_of
 from shoal.pictures.machine.surfaces import surfaces
 from shoal.scene import Scene
@@ -27,7 +28,7 @@ class Sketch:
     def __init__(self, scene: Scene) -> None:
         self._scene, self._marks = scene, Marks(scene)
         plane, space = (
-            (bodies, gears, joints, surfaces, loads),
+            (bodies, gears, joints, ropes, surfaces, loads),
             (spatial.masses, spatial.joints, spatial.surfaces, spatial_loads.loads),
         )
         kinds = plane if scene.dimensions == 2 else space
