@@ -50,7 +50,7 @@ class End(Record):
     angles: dict[str, float] = {}
     """Directions of markers, counted over full turns [rad]."""
     states: dict[str, float] = {}
-    """Values of states of the user."""
+    """Values of states of the user [1]."""
     measures: dict[str, float] = {}
     """Angles that signals measure, such as `angle(hinge)`, counted over full turns [rad]."""
 
