@@ -52,3 +52,24 @@ def test_limits_and_kept_lengths_become_ropes(tmp_path: Path) -> None:
     assert kept.scene["joints"]["t-length"]["keeps"] == "exactly"
     damped, _ = imported(tmp_path, 'damping="1"')
     assert any("tendon t: between more than two sites; its damping" in line for line in damped.left_out)
+
+
+BALL = """<mujoco><option gravity="0 0 -9.81" integrator="RK4" timestep="1e-4"/><worldbody>
+<body name="arm"><joint name="b" type="ball" stiffness="3" damping=".05"/>
+<inertial pos=".3 0 0" mass="1" diaginertia=".02 .02 .02"/><site name="tip" pos=".6 0 0"/></body>
+</worldbody></mujoco>"""
+
+
+def test_a_ball_with_a_spring_and_damping_becomes_a_bushing(tmp_path: Path) -> None:
+    mujoco: Any = pytest.importorskip("mujoco")
+    (tmp_path / "m.xml").write_text(BALL)
+    model = mujoco.MjModel.from_xml_string(BALL)
+    there = mujoco.MjData(model)
+    mujoco.mj_step(model, there, 3000)
+    mujoco.mj_kinematics(model, there)
+    found = read(tmp_path / "m.xml")
+    assert found.scene["loads"]["b-bushing"]["turn_stiffness"] == 3.0
+    assert not any("joint b" in line for line in found.left_out)
+    scene = Scene.parse(found.scene | {"markers": {"tip": {"body": "arm", "point": [0.6, 0.0, 0.0]}}})
+    ours = simulate(scene.with_values(FINE), np.array([0.3]))
+    assert ours.marker("tip")[0] == pytest.approx(there.site("tip").xpos, abs=1e-6)

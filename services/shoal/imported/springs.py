@@ -8,7 +8,7 @@ import numpy as np
 
 from shoal.imported.limits import add_stops
 from shoal.imported.parts import Parts
-from shoal.imported.rounding import Array, numbers
+from shoal.imported.rounding import ROUNDED, Array, numbers
 from shoal.imported.source import Source
 
 
@@ -28,10 +28,29 @@ def add_resistance(source: Source, own: list[int], made: dict[str, Any], parts: 
     made: a joint of a scene, or its kind alone where nothing can act in it. own: the joints that it stands for.
     """
     for one in own:
-        _add_friction(source, one, made, parts)
-        _add_spring(source, one, made, parts)
+        if not _add_bushing(source, one, made, parts):
+            _add_friction(source, one, made, parts)
+            _add_spring(source, one, made, parts)
         add_stops(source, one, made, _is_simple(source, one, made), parts)
         _add_rotor(source, one, made, parts)
+
+
+def _add_bushing(source: Source, one: int, made: dict[str, Any], parts: Parts) -> bool:
+    """Add the linear spring and damping of a ball that starts at rest as a bushing; return whether they are all."""
+    model, name, dof = source.model, source.joint_names[one], source.model.jnt_dofadr[one]
+    ball = model.jnt_type[one] == source.mujoco.mjtJoint.mjJNT_BALL and made["kind"] == "spherical"
+    further = (model.jnt_stiffnesspoly[one], model.dof_dampingpoly[dof], model.dof_frictionloss[dof])
+    at = slice(model.jnt_qposadr[one], model.jnt_qposadr[one] + 4)
+    found = {"turn_stiffness": float(model.jnt_stiffness[one]), "turn_damping": float(model.dof_damping[dof])}
+    found = {word: value for word, value in found.items() if value}
+    if not ball or not found or any(map(np.any, further)):
+        return False
+    if "turn_stiffness" in found and np.any(np.abs(model.qpos_spring[at] - source.data.qpos[at]) > ROUNDED):
+        return False
+    sides = {side: made[side] for side in ("first", "second")}
+    parts.loads[f"{name}-bushing"] = {"kind": "bushing", **sides, **found}
+    parts.origin[f"loads.{name}-bushing"] = f"joint {name}"
+    return True
 
 
 def resists(source: Source, one: int) -> bool:

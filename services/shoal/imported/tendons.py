@@ -56,8 +56,8 @@ def _reeved(source: Source, number: int, name: str, lengths: dict[int, int], par
     if _further(source, number):
         return False
     begin, *over, end = (source.at_site(site) for site in model.wrap_objid[first : first + count])
-    rope = {"kind": "rope", "first": begin, "second": end} | ({"over": over} if over else {})
-    wanted = {"length": rope | {"keeps": "exactly"}} if number in lengths else {}
+    rope: dict[str, Any] = {"kind": "rope", "first": begin, "second": end} | ({"over": over} if over else {})
+    wanted: dict[str, Any] = {"length": rope | {"keeps": "exactly"}} if number in lengths else {}
     wanted |= {"at-most": rope | {"length": most}} if limited else {}
     law = {"stiffness": acts.get("stiffness"), "exponent": 1.0}
     wanted |= {"spring": rope | {"length": high, "law": law}} if springs else {}

@@ -57,7 +57,8 @@ ROPE_LEAVES = rejects(
 SPAN_VANISHES = rejects(
     "span-vanishes",
     Status.FAILED,
-    "Two places that follow each other on a rope, or whose distance a coupling counts, meet or overlap.",
+    "Two places that follow each other on a rope, or whose distance a coupling counts, meet or overlap; or a "
+    "bushing is turned by half a turn, where its axis has no sense.",
     "end the run before (solver.duration), or add a contact or stop that keeps them apart",
 )
 SLACK = rejects(

@@ -72,7 +72,12 @@ def _vanishing(states: States, times: Array) -> Iterator[tuple[int, Finding]]:
             gone = states.q[:, unknown, lane] <= 0.0
             if np.any(gone):
                 time = float(times[int(np.argmax(gone))])
-                yield lane, kinds.SPAN_VANISHES.found(f"a span of {name} vanishes before t = {time:.6g} s", time=time)
+                said = (
+                    f"{name}: the turn reaches half a turn"
+                    if name.startswith("loads.")
+                    else f"a span of {name} vanishes"
+                )
+                yield lane, kinds.SPAN_VANISHES.found(f"{said} before t = {time:.6g} s", time=time)
 
 
 def _left(states: States, times: Array, name: str, rope: Rope) -> Iterator[tuple[int, Finding]]:

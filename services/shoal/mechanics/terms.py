@@ -133,6 +133,7 @@ class Terms:
         lengths: int = 0,
         drive: Composed | None = None,
         of_start: bool = True,
+        constant: Number = 0.0,
     ) -> None:
         """Sum of scalar products u . w, factor * angle of unit vector and factor * span, + drive(t) = 0.
 
@@ -142,7 +143,20 @@ class Terms:
         (u, w), *further = pairs
         form = np.eye(len(u.constant))
         self.held.append(
-            Term(name, u, w, form, 0.0, drive, lengths, tuple(angles), period, of_start, tuple(further), tuple(roots))
+            Term(
+                name,
+                u,
+                w,
+                form,
+                constant,
+                drive,
+                lengths,
+                tuple(angles),
+                period,
+                of_start,
+                tuple(further),
+                tuple(roots),
+            )
         )
 
     def begin(self, value: Callable[[Affine], Array]) -> None:

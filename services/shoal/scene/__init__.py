@@ -26,7 +26,7 @@ from shoal.scene.joints import (
     Weld,
 )
 from shoal.scene.load import load_scene, scene_names
-from shoal.scene.loads import LOAD_KINDS, DistributedForce, Force, Load, Spring, Thrust, Torque, TorsionSpring
+from shoal.scene.loads import LOAD_KINDS, Bushing, DistributedForce, Force, Load, Spring, Thrust, Torque, TorsionSpring
 from shoal.scene.scene import Scene
 from shoal.scene.solids import ModalBody, PointMass, RigidBody
 from shoal.scene.solver import Solver
@@ -38,6 +38,7 @@ __all__ = [
     "LOAD_KINDS",
     "Attachment",
     "Body",
+    "Bushing",
     "Contact",
     "ContactSurface",
     "Coupling",

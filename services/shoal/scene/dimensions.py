@@ -28,6 +28,9 @@ def check_dimensions(scene: Any) -> None:
         for name, joint in scene.joints.items():
             if joint.kind in SPATIAL_KINDS:
                 raise ValueError(f"joints.{name}.kind: {joint.kind} is a joint in space; say dimensions: 3")
+        for name, load in scene.loads.items():
+            if load.kind == "bushing":
+                raise ValueError(f"loads.{name}.kind: bushing is a load in space; say dimensions: 3")
         for name, body in scene.bodies.items():
             if body.element == "director-rod":
                 raise ValueError(f"bodies.{name}.element: director-rod is for scenes in space; say dimensions: 3")

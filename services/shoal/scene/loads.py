@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+import numpy as np
+from pydantic import BeforeValidator, Field
 
 from shoal.scene.function import Function, SignalFunction
 from shoal.scene.joints import Attachment, Direction, Z
 from shoal.scene.record import Axis, NonNegative, Record, Vector, kinds
+
+
+def _alike(given: Any) -> Any:
+    return (given,) * 3 if isinstance(given, int | float | str) else given
 
 
 class Elastic(Record):
@@ -53,6 +58,35 @@ class TorsionSpring(Elastic):
     """Relative angle at rest, counted over full turns [rad]; by default that of the start."""
     elastic: Function | None = None
     """Further elastic torque [N m] as a function of the angle from rest [rad], which it calls `t`."""
+
+
+Along = Annotated[tuple[NonNegative, NonNegative, NonNegative], BeforeValidator(_alike)]
+"""Three numbers, along the axes of the ground at the start; one stands for all of them."""
+
+
+class Bushing(Record):
+    """A spring and damper of all displacements and turns between two bodies, relaxed at the start. In space only."""
+
+    kind: Literal["bushing"] = "bushing"
+    first: Attachment
+    """Place on the first body, with whose axes the directions turn."""
+    second: Attachment
+    """Place on the second body."""
+    stiffness: Along = (0.0, 0.0, 0.0)
+    """Stiffness against displacements along the axes of the first body that are those of the ground at the start [N/m];
+    one number is that of all three.
+    """
+    damping: Along = (0.0, 0.0, 0.0)
+    """Viscous damping of these displacements [N s/m]."""
+    turn_stiffness: NonNegative = 0.0
+    """Stiffness against the turn from the start by an angle about any axis, of the torque along that axis [N m/rad]."""
+    turn_damping: NonNegative = 0.0
+    """Torque against the relative angular velocity [N m s/rad]."""
+
+    @property
+    def resists_turns(self) -> bool:
+        """Return whether it resists turns."""
+        return bool(np.any(self.turn_stiffness) or np.any(self.turn_damping))
 
 
 class Force(Record):
@@ -107,5 +141,7 @@ class DistributedForce(Record):
     """Factor as a function of time and signals [1]."""
 
 
-Load = Annotated[Spring | TorsionSpring | Force | Torque | Thrust | DistributedForce, Field(discriminator="kind")]
+Load = Annotated[
+    Spring | TorsionSpring | Bushing | Force | Torque | Thrust | DistributedForce, Field(discriminator="kind")
+]
 LOAD_KINDS = kinds(Load)

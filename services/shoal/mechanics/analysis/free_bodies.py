@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse
 
+from shoal.errors import InputError
 from shoal.mechanics import plane
 from shoal.mechanics import rotation as turns
 from shoal.mechanics.affine import points
@@ -27,7 +28,7 @@ from shoal.mechanics.machine import Machine
 from shoal.mechanics.modal.modes import held
 from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import Array
-from shoal.scene import InitialState, RigidBody, Rod, Scene, SignalFunction
+from shoal.scene import Bushing, InitialState, RigidBody, Rod, Scene, SignalFunction
 from shoal.scene.formula import Measure, Node, leaves
 from shoal.scene.sampled import Sampled
 from shoal.scene.signals import HeldValue, StateValue, expanded
@@ -46,6 +47,11 @@ class FreeBodies:
         alone, self._names = _with_strengths(whole)
         scene, added = _with_inertia(_without_joints(alone, joined))
         self.placement = place(scene)
+        for name, load in scene.loads.items():
+            if isinstance(load, Bushing) and load.resists_turns:
+                raise InputError(
+                    f"loads.{name}: forces of joints beside a bushing that resists turns are not yet found"
+                )
         model = build(scene, horizon=horizon, placement=self.placement)
         # Springs at rest as they start keep the natural values of the whole machine; joint friction came before them.
         rubbing = whole.forces.size - model.forces.size

@@ -16,6 +16,7 @@ from shoal.mechanics.assembly.masses import STATE
 from shoal.mechanics.assembly.measures import ElementForceLaw, Measures, naming
 from shoal.mechanics.assembly.rods import rod_axis
 from shoal.mechanics.assembly.signals import SignalLoads
+from shoal.mechanics.assembly.space.bushings import axes_of, law_of_turn
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
 from shoal.mechanics.assembly.space.hinges import axis_of, turning
 from shoal.mechanics.derived import RowAllocator
@@ -27,6 +28,7 @@ from shoal.mechanics.signals import Signals
 from shoal.scene import (
     GROUND,
     Attachment,
+    Bushing,
     DistributedForce,
     Force,
     Revolute,
@@ -204,6 +206,32 @@ class Loads(Measures):
         law = ElementForceLaw(load.stiffness, load.cubic, load.damping, rest)
         self._measure(name, DISTANCE, ends, law, 0.0, elastic=load.elastic)
 
+    def _bushing(self, name: str, load: Bushing) -> None:
+        assert isinstance(self.placement, SpatialPlacement)
+        ends = [self.placement.point(self.scene, side) for side in (load.first, load.second)]
+        axes, _ = axes_of(load, self.placement)
+        first, second = (self.placement.start_of(end)[0] for end in ends)
+        for axis, stiffness, damping in zip(axes, load.stiffness, load.damping, strict=True):
+            if np.any(stiffness) or np.any(damping):
+                natural = sum((second - first) * self.placement.start_of(axis)[0])
+                law = ElementForceLaw(stiffness, damping=damping, natural=natural)
+                self._measure(name, PLACE, [*ends, axis], law, 0.0)
+        if not load.resists_turns:
+            return
+        w, v = self.placement.turns[name]
+        nowhere, units = fixed(np.zeros((3, 1))), np.eye(3)[..., None]
+        if np.any(load.turn_stiffness):
+            if np.ndim(load.turn_stiffness):
+                raise InputError(f"loads.{name}.turn_stiffness: cannot vary; state each in a scene of its own")
+            self._measure(
+                name, DISTANCE, [nowhere, v], ElementForceLaw(), 0.0, elastic=law_of_turn(load.turn_stiffness)
+            )
+        if np.any(load.turn_damping):
+            # |omega|^2 is four times the sum of the squares of the rates.
+            law = ElementForceLaw(damping=4.0 * load.turn_damping)
+            for vector, along in [(w, units[0]), *((v, unit) for unit in units)]:
+                self._measure(name, PLACE, [nowhere, vector, fixed(along)], law, 0.0)
+
     def _force(self, name: str, load: Force) -> None:
         point = self.placement.point(self.scene, load.at)
         number = self._function(f"loads.{name}.scale", load.scale)
@@ -277,6 +305,7 @@ class Loads(Measures):
 LOADS: dict[type, Callable[[Loads, str, Any], None]] = {
     Spring: Loads._spring,
     TorsionSpring: Loads._torsion_spring,
+    Bushing: Loads._bushing,
     Force: Loads._force,
     Torque: Loads._torque,
     Thrust: Loads._thrust,

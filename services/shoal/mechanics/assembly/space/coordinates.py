@@ -34,6 +34,8 @@ class SpatialPlacement(AttitudeVectors, Placement):
         """Joints whose directions are shared, so that no constraint holds them."""
         self.strained: dict[tuple[str, int | None], Array] = {}
         """How sections of rods that start strained are turned from the unstrained start, by body and node."""
+        self.turns: dict[str, tuple[Affine, Affine]] = {}
+        """Of bushings that resist turns, w and v of the quaternion, see `bushings`."""
         self.chosen: set[tuple[str, int]] = set()
         """Bodies, and which joint points determine their rotation."""
 

@@ -23,6 +23,7 @@ from shoal.mechanics.assembly.groups import JointPoint, is_stiff, rotated, trans
 from shoal.mechanics.assembly.phases import make_phases
 from shoal.mechanics.assembly.placing import hold, next_body, place_driver, place_point
 from shoal.mechanics.assembly.space.axes import JointAxis
+from shoal.mechanics.assembly.space.bushings import make_turns
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
 from shoal.mechanics.assembly.space.hinges import make_axes
 from shoal.mechanics.assembly.space.rod_joints import hold_rod
@@ -67,6 +68,7 @@ def place_in_space(scene: Scene, poses: Mapping[str, tuple[Array, Array]] | None
             for normal in turns.across(direction):
                 result.terms.dot(joint, fixed(normal), point.where - fixed(base), 1)
     make_phases(scene, result)
+    make_turns(scene, result)
     hold(scene, result)
     for joint, condition in joints.of_scene(scene):
         sides_of_rods = isinstance(condition, Aligned | Turned | Square) and not all(
