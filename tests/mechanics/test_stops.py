@@ -72,6 +72,7 @@ def test_lanes_with_events_of_their_own_move_as_they_would_alone() -> None:
     for lane, value in enumerate(values):
         alone = simulate(rod(float(value), relative_tolerance=1e-12), times)
         np.testing.assert_allclose(together.points[..., lane], alone.points[..., 0], atol=1e-9)
+        assert [what for _, what in together.words[lane]] == [what for _, what in alone.words[0]]
 
 
 def test_a_perfect_stop_loses_nothing_and_repeats() -> None:

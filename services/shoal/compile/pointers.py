@@ -35,6 +35,17 @@ def shift(typing_context, base, offset):  # type: ignore[no-untyped-def]
 
 
 @intrinsic
+def pointed(typing_context, address):  # type: ignore[no-untyped-def]
+    """Return the pointer to numbers that lie at an address."""
+    kind = types.CPointer(types.float64)
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        return builder.inttoptr(arguments[0], context.get_value_type(kind))
+
+    return kind(address), generate
+
+
+@intrinsic
 def raw(typing_context, structure):  # type: ignore[no-untyped-def]
     """Return a structure (a tuple, named or not) with pointers in place of its arrays and of those inside its parts."""
 

@@ -1,7 +1,7 @@
 """Event location within a step: the first root of gaps and contact forces in its dense output.
 
-A gap is looked at only where it could close: its rates at the ends times the step, doubled, against its size. There the
-step is divided, and each part is judged by values and rates at both ends, so that a gap that closes and opens again is
+A gap is looked at only where it could close with rates of at most twice those at the ends of the step. There the step
+is divided, and each part is judged by values and rates at both ends, so that a gap that closes and opens again is
 seen by the root of its rate.
 """
 
@@ -66,23 +66,13 @@ def shift(tile: Tile, m: Arrays, w: Work) -> None:
         w.gaps.before[LEFT * count + at] = max(w.gaps.before[LEFT * count + at], 0.0)
 
 
-@njit(cache=True, error_model="numpy")
-def approach(tile: Tile, m: Arrays, w: Work, taken: float) -> bool:
-    """Mark the lanes of a tile of several in which a contact is closed or could close; return whether all are marked.
+@njit(cache=True, error_model="numpy", forceinline=True)
+def is_far(both: float, fastest: float, taken: float) -> bool:
+    """Return whether a gap cannot close in a step, by the sum of its sizes and the fastest of its rates at both ends.
 
-    A tile takes common steps, which the events of each lane would cut; taken: length of the last step [s]
+    With |g'| <= R in the step, of the length h, g >= (g(0) + g(h) - R h) / 2; R: twice the fastest.
     """
-    g, width = w.gaps, len(tile)
-    count, free = m.gaps.size * width, False
-    kernels.look(tile, m, w, w.z, w.zdot)
-    for at in range(count):
-        reach = 2.0 * taken * max(abs(g.before[RATE * count + at]), abs(g.rate[at]))
-        if m.gaps.kind[at // width] == DRY or not min(g.before[at], g.value[at]) > reach:
-            g.alone[at % width] = 1.0
-        g.before[at], g.before[RATE * count + at] = g.value[at], g.rate[at]
-    for lane in range(width):
-        free = free or g.alone[lane] == 0.0
-    return not free
+    return both > 2.0 * fastest * taken
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -129,8 +119,8 @@ def first(
             holding = holding or g.dips[at] != 0.0 or _pulls(m, w, width, at) or _turns(m, w, width, at, taken)
             near = near or g.left[at] < 0.0
         else:
-            reach = 2.0 * taken * max(abs(g.before[RATE * count + at]), abs(g.rate[at]))
-            g.looked[at] = 1.0 if min(g.before[at], g.value[at]) < reach else 0.0
+            fastest = max(abs(g.before[RATE * count + at]), abs(g.rate[at]))
+            g.looked[at] = 0.0 if is_far(g.before[at] + g.value[at], fastest, taken) else 1.0
             near = near or g.looked[at] != 0.0
     if not (near or holding):
         return NEVER

@@ -23,6 +23,8 @@ RIGID, GIVES = 0, 1
 """Whether a contact is rigid, or gives way by a law of its force."""
 STIFFNESS, EXPONENT, DAMPING, LOSS, VISCOSITY = range(5)
 LAW_SIZE = 5
+FEW = 3 * 3 + 4 * 3
+"""Numbers of room for the equations of one contact: matrix, right side, solution, scale and order."""
 PLANE = 2
 """Directions of a contact with one tangent."""
 STICK, SLIP = 1.0, 2.0
@@ -87,11 +89,13 @@ class GapWork(NamedTuple):
     contacts, lanes); axes: normal and tangents, (9 * contacts, lanes). gradient, response: of each direction, and the
     acceleration by a unit force, (directions * unknowns, lanes). none: the acceleration without forces, unit: a unit
     force, (rows, lanes). reaction: multipliers of the constraints: without forces, by a unit force of each direction,
-    and as they are, ((directions + 2) * constraints, lanes). matrix, load, found, way, chosen: of one lane. pair:
+    and as they are, ((directions + 2) * constraints, lanes). matrix, load, found, way, chosen: of one lane;
+    few: of one contact. pair:
     `pairs.describe`. order: of the last impact, how far the impulses of contacts that strike one after the other would
     be from those at once, (lanes,). log: time, contact, kind, impulse and `order` of each event of the first lane,
     (RECORD * LOGGED,); number: of events, decisions: times at which contacts were decided on, alone: whether a lane of
-    a tile of several comes near an event, which it has to meet alone, (lanes,).
+    a tile of several takes steps by itself (`lane_events`), (lanes,), apart: what it has dissipated [J] and its power
+    [W], (2 * lanes,).
     """
 
     memory: Array
@@ -129,12 +133,14 @@ class GapWork(NamedTuple):
     found: Array
     way: Array
     chosen: Array
+    few: Array
     pair: Array
     order: Array
     log: Array
     number: Array
     decisions: Array
     alone: Array
+    apart: Array
 
 
 LOGGED, RECORD = 4096, 5
@@ -154,8 +160,10 @@ def room(width: int, g: Gaps, unknowns: int, rows: int, constraints: int) -> Gap
         "bias": by_way,
         "heading": 3 * each, "axes": 9 * each, "gradient": vectors, "response": vectors, "none": whole, "unit": whole,
         "reaction": reaction, "matrix": ways * ways, "load": ways, "found": ways, "way": ways, "chosen": n,
+        "few": FEW if n else 0,
         "pair": pairs.ROOM if g.pairs.size else 0, "order": width if n else 0, "log": RECORD * LOGGED if n else 0,
         "number": width if n else 0, "decisions": width if n else 0, "alone": width if n else 0,
+        "apart": 2 * width if n else 0,
     }  # fmt: skip
     work = GapWork._make([np.zeros(sizes.get(name, each)) for name in GapWork._fields])
     return work._replace(given=np.array(g.given, dtype=float).ravel())

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,7 @@ from numba import carray, njit, typeof, types
 from shoal.compile import function_pointers, simd, structures
 from shoal.compile.pointers import pointer, raw_type, shift
 from shoal.compile.structures import Reference
-from shoal.mechanics import constraints, gaps, kernels, signals, switch_events
+from shoal.mechanics import constraints, gaps, kernels, lane_events, signals, switch_events
 from shoal.mechanics import contact_events as events
 from shoal.mechanics.derived import derive
 from shoal.mechanics.dynamics import Work, instant, loaded, remember
@@ -44,6 +45,7 @@ from shoal.mechanics.marched import (
     SINCE,
     SWITCH,
     TAKEN,
+    WAITS,
     WHOLE,
     Frame,
     LoopRoom,
@@ -92,6 +94,7 @@ class March:
     def __init__(self, frame: Frame, seconds: float = PAUSE) -> None:
         """seconds: that a step takes, by order of magnitude."""
         self.frame, self._first = frame, PAUSE / seconds
+        self.own_march: Callable[[int], March] | None = None
         self._storage = structures.storage()
         arrays = seen(frame.arrays)
         structures.write(arrays.storage, arrays)
@@ -112,12 +115,15 @@ class March:
         """
         progress = self.frame.own.progress
         steps, before, slow = self._first, (0.0, 0.0), False
-        progress[:] = 0.0
+        progress[:], self.frame.apart[:] = 0.0, 0
         while True:
             progress[ROOM], begin = max(1.0, steps), time.perf_counter()
             _call(self._loop, self._storage)
             if progress[DONE]:
                 return
+            if progress[WAITS]:
+                self._give_marches()
+                continue
             if (stop is not None and stop.is_set()) or not threading.main_thread().is_alive():
                 raise KeyboardInterrupt
             now = progress[NOW], progress[NUMBER]
@@ -127,6 +133,22 @@ class March:
                     return
                 slow = creeping
             steps = progress[ROOM] * min(GROWTH, PAUSE / (time.perf_counter() - begin))
+
+    def _give_marches(self) -> None:
+        """Give the lanes that come near events marches of their own."""
+        for lane in np.flatnonzero(self.frame.room.gaps.alone[: self.frame.lanes]):
+            found = self.frame.apart[lane_events.ADDRESSES * lane :][: lane_events.ADDRESSES]
+            if not found[0]:
+                assert self.own_march is not None
+                found[:] = self.own_march(int(lane)).addresses
+
+    @property
+    def addresses(self) -> list[int]:
+        """Where `lane_events` finds the march of one lane."""
+        frame = self.frame
+        visit = kernels.address(("visit", len(frame.tile)), lambda: lane_events.visit_kernel(frame))
+        places = (array.ctypes.data for array in (self._storage, frame.record.samples, frame.record.contacts))
+        return [visit, self._loop, *places]
 
     def _creeps(self, begin: float, first: float, now: float, number: float) -> bool:
         """Return whether a lane is at a singular position, and the run, if ten times as fast, would still not end."""
@@ -197,7 +219,7 @@ def loop(frame):  # type: ignore[no-untyped-def]
     now, taken, number, cuts, whole = own[NOW], own[TAKEN], int(own[NUMBER]), int(own[CUTS]), own[WHOLE] > 0.0
     sample, halt, room = np.int64(own[SAMPLE]), int(own[HALT]), number + int(own[CUTS]) + int(own[ROOM])
     while True:
-        slack = 1e-9 * (taken if free else step)
+        slack, earlier = 1e-9 * (taken if free else step), sample
         while sample < len(times) and times[sample] <= now + slack:
             _sample(tile, scheme, m, w, k, marker_rows, times[sample] - now, taken, slack, record.samples, sample)
             _keep_contacts(tile, m, w, record, sample, False)
@@ -205,6 +227,8 @@ def loop(frame):  # type: ignore[no-untyped-def]
                 kept = shift(record.signals, sample * frame.outputs * len(tile))
                 signals.follow(tile, m, w, instant(w, times[sample]), k.q, k.v, kept, signals.RECORD)
             sample += 1
+        if frame.lanes > 0 and sample > earlier:
+            lane_events.take_samples(tile, m, w, record, frame.apart, frame.lanes, marker_rows, earlier, sample)
         if own[SWITCH] > 0.0:
             own[SWITCH] = 0.0
             signals.follow(tile, m, w, now, w.z, w.zdot, w.z, signals.TURN)
@@ -221,7 +245,8 @@ def loop(frame):  # type: ignore[no-untyped-def]
         own[DONE] = 1.0 if number == steps or now >= ending else own[DONE]
         if own[DONE] > 0.0 or number + cuts >= room:
             break
-        if halt <= last and now == halts.times[halt]:
+        jumps = halt <= last and now == halts.times[halt]
+        if jumps:
             asked = halts.due[halt]
             halt += 1
             w.until[0] = np.nextafter(halts.times[halt], 0.0) if halt <= last else np.inf
@@ -236,15 +261,20 @@ def loop(frame):  # type: ignore[no-untyped-def]
             target = halts.times[halt]
         rest = step if whole and not (free or halted) else target - now
         sampling = sample < len(times) and (free or times[sample] < now + step * (1 - 1e-9))
-        begin = now
+        begin, before, complete = now, number, whole
         finders = frame.first_event, frame.first_switch
         short = SHORT * step if scheme.divides else 0.0
-        taken = _advance(tile, scheme, m, w, k, halts, finders, now, rest, snap, short, tolerance, sampling)
+        if own[WAITS] > 0.0:
+            taken, own[WAITS] = own[WAITS], 0.0
+        else:
+            taken = _advance(tile, scheme, m, w, k, halts, finders, now, rest, snap, short, tolerance, sampling)
+            if frame.lanes > 0:
+                lane_events.approach(tile, m, w, taken)
+                if lane_events.lacks(w, frame.apart, frame.lanes):
+                    own[WAITS] = taken
+                    break
         if own[SWITCH] == 0.0 or now + taken - own[SINCE] > step:
             own[ROW] = 0.0
-        if m.gaps.size > 0 and len(tile) > 1 and events.approach(tile, m, w, taken):
-            own[DONE] = 1.0
-            break
         arrived = taken >= rest
         if free:
             number += 1
@@ -256,10 +286,16 @@ def loop(frame):  # type: ignore[no-untyped-def]
             now = (target if halted else grid) if arrived else now + taken
             number += 1 if whole else 0
             cuts += 0 if whole else 1
+        if frame.lanes > 0:
+            lane_events.meet(
+                tile, m, w, k, record, frame.apart, frame.lanes, begin, now, before, complete, sample, halt, jumps
+            )
         remember(tile, m, w)
         _count_turns(tile, m, w, k, marker_rows)
         if loaded(m):
             _account(tile, scheme, m, w, k, begin, taken, tolerance)
+        if frame.lanes > 0:
+            lane_events.account(tile, w, k)
         due = (number + cuts) % check_every == 0 or number == steps or now >= ending
         if due and not _look(tile, m, w, k, now, record):
             own[DONE] = 1.0
@@ -421,7 +457,7 @@ def _advance(
     end = m.unknowns * len(tile)
     watched, touches = halts.marks.size > 0, m.gaps.size > 0 and len(tile) == 1
     first_event, first_switch = finders
-    if keep or watched or touches or first_switch != 0 or (scheme.adaptive and loaded(m)):
+    if keep or watched or m.gaps.size > 0 or first_switch != 0 or (scheme.adaptive and loaded(m)):
         for i in range(end):
             k.past[i], k.past[end + i], k.past[2 * end + i] = w.z[i], w.zdot[i], w.a[i]
     if watched:
@@ -467,7 +503,7 @@ def _advance(
                 k.progress[SWITCH] = 1.0 if turns else 0.0
             if touches:
                 k.progress[EVENT] = 1.0 if aims > 0 else 0.0
-            return taken  # type: ignore[no-any-return]
+            return taken
         for i in range(end):
             w.z[i], w.zdot[i], w.a[i] = k.past[i], k.past[end + i], k.past[2 * end + i]
         if touches and aims <= 1:

@@ -19,12 +19,14 @@ from shoal.mechanics.numerics.tile import Array, Index, Tile
 
 TURN = 2.0 * np.pi
 
-BEGUN, DONE, ROOM, NOW, ENDING, TAKEN, WHOLE, NUMBER, CUTS, SAMPLE, HALT, EVENT, SWITCH, ROW, SINCE = range(15)
+BEGUN, DONE, ROOM, NOW, ENDING, TAKEN, WHOLE, NUMBER, CUTS, SAMPLE, HALT, EVENT, SWITCH, ROW, SINCE, WAITS = range(16)
 """Progress of the loop: whether it has begun and is done; after how many more steps it returns; the time that it has
 reached and at which it ends [s]; the length of the last step [s], and whether that led to a whole step of a fixed
 length; the numbers of whole steps, of others, of samples and of halts so far; and whether the last step ended at an
-event of a contact, or where signals switch; and how many steps in a row did that, since when [s]."""
-PROGRESS = 15
+event of a contact, or where signals switch; and how many steps in a row did that, since when [s]; the
+length of a step that waits for lanes that meet events by themselves [s]."""
+PROGRESS = 16
+_NONE: Index = np.zeros(0, dtype=np.int64)
 
 
 class Marched(NamedTuple):
@@ -135,7 +137,8 @@ class Frame(NamedTuple):
     number of marker rows; halts: where steps end, `stops` times and `marks` marks; there forces may jump, and driven
     constraints their rates. tolerance: from which rows count as dependent. first_event: address of the kernel of
     `contact_events.first`, 0 for machines without contacts; first_switch: of `switch_events.first`, 0 where no signal
-    switches. outputs: number of signals that are recorded. What is not reached stays nan in the record.
+    switches. outputs: number of signals that are recorded. apart: addresses of lanes that meet events of contacts by
+    themselves, of so many `lanes`, see `lane_events`. What is not reached stays nan in the record.
     """
 
     tile: Tile
@@ -157,6 +160,8 @@ class Frame(NamedTuple):
     first_event: int = 0
     first_switch: int = 0
     outputs: int = 0
+    apart: Index = _NONE
+    lanes: int = 0
 
 
 def framed(

@@ -29,6 +29,7 @@ from shoal.mechanics.halts import Halts
 from shoal.mechanics.integrators import Choice, halting
 from shoal.mechanics.integrators import facts as facts_of
 from shoal.mechanics.kernels import Seek
+from shoal.mechanics.march import March
 from shoal.mechanics.marched import (
     CLOSENESS,
     CONSTRAINT_DRIFT,
@@ -116,7 +117,8 @@ class Runs:
         states = States.room(moved, len(times)) if whole else None
         stop = Event() if workers > 1 else None
 
-        def march(part: slice) -> None:
+        def take(part: slice) -> tuple[Workspace, list[Workspace]]:
+            """Return a workspace for some lanes, and where to put it afterwards."""
             count = part.stop - part.start
             tile = SINGLE if count == 1 else WIDE
             spare = HALF if self._halves and 1 < count <= HALF else 0
@@ -124,7 +126,21 @@ class Runs:
             space = None if seek is not None or not idle else _taken(idle)
             if space is None:
                 space = Workspace(self.scene.solver, moved, self.choice, tile, part, times, halts, seek, spare, whole)
+            return space, idle if seek is None and self._alike and space.size <= LARGEST else []
+
+        def march(part: slice) -> None:
+            count, tile = part.stop - part.start, SINGLE if part.stop - part.start == 1 else WIDE
+            space, idle = take(part)
+            own: dict[int, tuple[Workspace, list[Workspace]]] = {}
+
+            def own_march(lane: int) -> March:
+                own[lane] = take(slice(part.start + lane, part.start + lane + 1))
+                own[lane][0].clear()
+                return own[lane][0].march
+
+            space.march.own_march = own_march
             record = space.run(moved, part, stop)
+            space.march.own_march = None
             record = record if states is None else split(record, states, len(tile), part)
             reduce_record(record, len(tile), part.start, turns, limits.anchors, floor, limits.span, motion, numbers)
             if count == 1 and self.model.gaps.size:
@@ -139,12 +155,10 @@ class Runs:
                 unclear.extend(space.unclear)
             if single not in self._found:
                 self._found[single] = pickle.dumps(self._facts(record.begin if single else None))
-            gaps = space.march.frame.room.gaps
-            alone = np.flatnonzero(gaps.alone[:count]) if count > 1 else ()
-            if seek is None and self._alike and space.size <= LARGEST:
-                idle.append(space)
-            for lane in alone:  # its events would cut the steps of all
-                march(slice(part.start + int(lane), part.start + int(lane) + 1))
+            for lane, (one, _) in own.items():
+                words[part.start + lane] = [letter(event) for event in one.events]
+            for one, others in ((space, idle), *own.values()):
+                others.append(one)
 
         free = not (self.model.constraints.size or self.model.gaps.size)
         if end == 0.0 and seek is None and self._alike and free:
@@ -209,7 +223,7 @@ class Runs:
         Lanes of adaptive integrators stay together, so that neighbours take equal steps. The number of threads has no
         influence.
         """
-        switching = self.model.signals and self.model.signals.switches > 0 and not self.model.gaps.size
+        switching = self.model.signals and (self.model.signals.switches > 0 or self.model.gaps.size > 0)
         if switching or np.any(self.model.gaps.kind == DRY):  # whose contacts are closed from the start
             return [slice(k, k + 1) for k in range(lanes)]
         _, parts = tiles(lanes)

@@ -18,6 +18,7 @@ from shoal.mechanics.halts import Halts
 from shoal.mechanics.integrators import Choice, choose, facts
 from shoal.mechanics.integrators.scheme import connect
 from shoal.mechanics.kernels import Seek, Sought, ready
+from shoal.mechanics.lane_events import ADDRESSES
 from shoal.mechanics.least.principle import PROJECTION
 from shoal.mechanics.march import March
 from shoal.mechanics.marched import Marched, framed
@@ -116,8 +117,12 @@ class Workspace:
         rows = np.concatenate([model.marker_rows.ravel(), states.rows(model)]) if whole else model.marker_rows.ravel()
         scheme = connect(tile, settings, arrays, room)
         frame = framed(tile, scheme, arrays, room, solver.step, steps, times.copy(), rows, solver.rank_tolerance, halts)
+        if model.gaps.size and len(tile) > 1:
+            lanes = part.stop - part.start
+            frame = frame._replace(apart=np.zeros(ADDRESSES * lanes, dtype=np.int64), lanes=lanes)
+        log = frame.room.gaps.log
         own = frame.room, settings, frame.own, frame.record
-        self._block, (room, self._settings, loop, record) = gathered(own)
+        self._block, (room, self._settings, loop, record) = gathered(own, log)
         scheme = connect(tile, self._settings, arrays, room)
         frame = frame._replace(room=room, scheme=scheme, own=loop, record=record)
         self._sought = None if seek is None else Sought(seek(arrays, room), model.unknowns)
@@ -126,7 +131,7 @@ class Workspace:
         known = facts(choice.name)
         numbers = max(1, model.unknowns) * len(tile)
         self.march = March(frame, known.seconds_per_unknown[model.constraints.size > 0] * known.stages * numbers)
-        self._start = self._block.copy()
+        self._start = self._block[: self._block.size - log.size].copy()
 
     @property
     def size(self) -> int:
@@ -184,12 +189,16 @@ class Workspace:
         turns = np.append(frame.room.memory, frame.room.signals[: signals.measures.size if signals else 0])
         return frame.own.q[:n].copy(), frame.own.v[:n].copy(), turns
 
+    def clear(self) -> None:
+        """Make the room of the march as it was, but for the log of events, which is counted."""
+        np.copyto(self._block[: self._start.size], self._start)
+
     def run(self, model: Model, part: slice, stop: Event | None = None) -> Marched:
         """The record of a march from the start of a model that differs in its start only; good until the next one.
 
         stop: as for `March`.
         """
-        np.copyto(self._block, self._start)
+        self.clear()
         if model is not self._model or part != self._part:
             frame = self.march.frame
             put_at_start(model, self._tile, part, frame.arrays, frame.room)
@@ -199,9 +208,14 @@ class Workspace:
         return self.march.frame.record
 
 
-def gathered(structure: T) -> tuple[Array, T]:
-    """One block of memory, and the structure with its arrays of real numbers copied into it, on lines of the cache."""
+def gathered(structure: T, last: Array | None = None) -> tuple[Array, T]:
+    """One block of memory, and the structure with its arrays of real numbers copied into it, on lines of the cache.
+
+    last: the array that comes last, of a multiple of a line
+    """
     arrays = {id(array): array for array in _reals(structure)}
+    if last is not None:
+        arrays[id(last)] = arrays.pop(id(last))
     sizes = [-(-array.size // _LINE) * _LINE for array in arrays.values()]
     room = np.zeros(sum(sizes) + _LINE)
     first = -(room.ctypes.data // room.itemsize) % _LINE

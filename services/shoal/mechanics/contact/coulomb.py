@@ -12,6 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from shoal.compile.pointers import shift
 from shoal.mechanics.gaps import DRY, RIGID, SLIP, STICK, Gaps
 from shoal.mechanics.numerics.tile import Array, Index
 
@@ -42,10 +43,32 @@ ANGLES = 32
 def solve(n: int, matrix: Array, load: Array, out: Array, null: Array) -> int:
     """Solve A x = load of consistent equations, with x = 0 where they leave it open; (n, n) in rows. Returns the rank.
 
-    null: vectors z with A z = 0 that span all of them, one after the other, (n * n,), or empty. Destroys both. Gauss's
+    null: vectors z with A z = 0 that span all of them, one after the other, (n * n,). Destroys both. Gauss's
     elimination with complete pivoting of the rows and columns scaled to 1.
     """
-    scale, order, rank = np.ones(n), np.arange(n), 0
+    scale, order = np.zeros(n), np.zeros(n)
+    rank = _eliminate(n, matrix, load, out, scale, order)
+    for free in range(rank, n):
+        first = (free - rank) * n
+        for i in range(n):
+            null[first + i] = 0.0
+        null[first + int(order[free])] = 1.0
+        for k in range(rank - 1, -1, -1):
+            total = matrix[k * n + free]
+            for j in range(k + 1, rank):
+                total += matrix[k * n + j] * null[first + int(order[j])]
+            null[first + int(order[k])] = -total / matrix[k * n + k]
+        for i in range(n):
+            null[first + i] *= scale[i]
+    return rank  # type: ignore[no-any-return]
+
+
+@njit(cache=True, error_model="numpy")
+def _eliminate(n: int, matrix: Array, load: Array, out: Array, scale: Array, order: Array) -> int:
+    """Eliminate as `solve` does, with scales of the columns and their order, (n,), in room. Arrays or pointers."""
+    rank = 0
+    for i in range(n):
+        scale[i], order[i] = 1.0, i
     for turn in range(2):
         for i in range(n):
             largest = 0.0
@@ -84,22 +107,10 @@ def solve(n: int, matrix: Array, load: Array, out: Array, null: Array) -> int:
     for k in range(rank - 1, -1, -1):
         total = load[k]
         for j in range(k + 1, rank):
-            total -= matrix[k * n + j] * out[order[j]]
-        out[order[k]] = total / matrix[k * n + k]
+            total -= matrix[k * n + j] * out[int(order[j])]
+        out[int(order[k])] = total / matrix[k * n + k]
     for i in range(n):
         out[i] *= scale[i]
-    for free in range(rank, n if len(null) > 0 else rank):
-        first = (free - rank) * n
-        for i in range(n):
-            null[first + i] = 0.0
-        null[first + order[free]] = 1.0
-        for k in range(rank - 1, -1, -1):
-            total = matrix[k * n + free]
-            for j in range(k + 1, rank):
-                total += matrix[k * n + j] * null[first + order[j]]
-            null[first + order[k]] = -total / matrix[k * n + k]
-        for i in range(n):
-            null[first + i] *= scale[i]
     return rank
 
 
@@ -253,6 +264,7 @@ def is_unknown(gaps: Gaps, contact: int, k: int, mode: float) -> bool:
 @njit(cache=True, error_model="numpy")
 def decide(
     gaps: Gaps,
+    few: Array,
     given: Array,
     width: int,
     lane: int,
@@ -267,7 +279,7 @@ def decide(
 
     mode: OPEN of those to be left out, KNOWN of those whose slip is known, with its direction in way; any other of
     those to be decided. Replaces modes and ways by those that hold. impulsive: whether these are impulses, of which
-    given friction has none.
+    given friction has none. few: room of one contact, (`gaps.FEW`,).
     """
     ways = 1 + gaps.tangents
     n = gaps.size * ways
@@ -296,7 +308,9 @@ def decide(
                         rest[row] += matrix[row * n + j] * out[j]
             if gaps.soft[contact] != RIGID:
                 rest[first] = load[first]
-            found = alone(gaps, given, contact, width, lane, asked[contact], mode, way, matrix, rest, out, impulsive)
+            found = alone(
+                gaps, few, given, contact, width, lane, asked[contact], mode, way, matrix, rest, out, impulsive
+            )
             if found > outcome % TROUBLES:
                 outcome = found + TROUBLES * contact
             for row in range(first, first + ways):
@@ -391,9 +405,8 @@ def limit(gaps: Gaps, given: Array, contact: int, width: int, lane: int, normal:
 
 @njit(cache=True, error_model="numpy")
 def alone(
-    gaps: Gaps, given: Array, contact: int, width: int, lane: int, asked: float, mode: Array, way: Array, matrix: Array,
-    rest: Array,
-    out: Array, impulsive: bool,
+    gaps: Gaps, few: Array, given: Array, contact: int, width: int, lane: int, asked: float, mode: Array, way: Array,
+    matrix: Array, rest: Array, out: Array, impulsive: bool,
 ) -> int:  # fmt: skip
     """Decide one contact exactly, with the rates that the others leave; returns the outcome."""
     ways, at = 1 + gaps.tangents, contact * width + lane
@@ -412,7 +425,7 @@ def alone(
         out[row] = -most * way[row]
         return FINE
     if gaps.soft[contact] != RIGID:
-        _under(gaps, given, contact, width, lane, asked, mode, way, matrix, rest, out)
+        _under(gaps, few, given, contact, width, lane, asked, mode, way, matrix, rest, out)
         return FINE
     normal, own = rest[first], matrix[first * n + first]
     mode[contact] = KNOWN if asked == KNOWN else STICK
@@ -434,13 +447,15 @@ def alone(
     if normal >= 0.0:
         mode[contact] = OPEN
         return FINE
-    block, right, push = np.zeros(ways * ways), np.zeros(ways), np.zeros(ways)
+    right, push, square = shift(few, ways * ways), shift(few, ways * ways + ways), 0.0
     for i in range(ways):
         right[i] = -rest[first + i]
         for j in range(ways):
-            block[i * ways + j] = matrix[(first + i) * n + first + j]
-    solve(ways, block, right, push, np.zeros(0))
-    tangential = np.sqrt(np.sum(push[1:] ** 2))
+            few[i * ways + j] = matrix[(first + i) * n + first + j]
+    _eliminate(ways, few, right, push, shift(few, ways * ways + 2 * ways), shift(few, ways * ways + 3 * ways))
+    for k in range(1, ways):
+        square += push[k] ** 2
+    tangential = np.sqrt(square)
     within = push[0] >= 0.0 and tangential <= limit(gaps, given, contact, width, lane, push[0], True)
     if within and _vanish(ways, n, first, matrix, rest, push):
         for k in range(ways):
@@ -468,9 +483,8 @@ def _vanish(ways: int, n: int, first: int, matrix: Array, rest: Array, push: Arr
 
 @njit(cache=True, error_model="numpy")
 def _under(
-    gaps: Gaps, given: Array, contact: int, width: int, lane: int, asked: float, mode: Array, way: Array, matrix: Array,
-    rest: Array,
-    out: Array,
+    gaps: Gaps, few: Array, given: Array, contact: int, width: int, lane: int, asked: float, mode: Array, way: Array,
+    matrix: Array, rest: Array, out: Array,
 ) -> None:  # fmt: skip
     """Let a contact stick or slip under a normal force that is known."""
     ways, at = 1 + gaps.tangents, contact * width + lane
@@ -479,14 +493,16 @@ def _under(
     if gaps.rubs[contact] == 0:
         return
     if asked != KNOWN:
-        block, right, push = np.zeros(ways * ways), np.zeros(ways), np.zeros(ways)
-        block[0] = 1.0
-        for i in range(1, ways):
-            right[i] = -rest[first + i] - matrix[(first + i) * n + first] * normal
-            for j in range(1, ways):
-                block[i * ways + j] = matrix[(first + i) * n + first + j]
-        solve(ways, block, right, push, np.zeros(0))
-        size = np.sqrt(np.sum(push[1:] ** 2))
+        right, push, square = shift(few, ways * ways), shift(few, ways * ways + ways), 0.0
+        for i in range(ways):
+            right[i] = -rest[first + i] - matrix[(first + i) * n + first] * normal if i > 0 else 0.0
+            for j in range(ways):
+                inside = i > 0 and j > 0
+                few[i * ways + j] = matrix[(first + i) * n + first + j] if inside else (1.0 if i == j else 0.0)
+        _eliminate(ways, few, right, push, shift(few, ways * ways + 2 * ways), shift(few, ways * ways + 3 * ways))
+        for k in range(1, ways):
+            square += push[k] ** 2
+        size = np.sqrt(square)
         if size <= limit(gaps, given, contact, width, lane, max(normal, 0.0), True):
             for k in range(1, ways):
                 out[first + k] = push[k]

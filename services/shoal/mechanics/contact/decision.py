@@ -293,7 +293,7 @@ def _decide(m: Arrays, w: Work, width: int, lane: int) -> int:
     for _ in range(ROUNDS):
         for contact in range(m.gaps.size):
             g.chosen[contact] = asked[contact]
-        outcome = coulomb.decide(m.gaps, g.given, width, lane, g.chosen, g.way, g.matrix, g.load, g.found, False)
+        outcome = coulomb.decide(m.gaps, g.few, g.given, width, lane, g.chosen, g.way, g.matrix, g.load, g.found, False)
         if outcome != FINE or response.allow(m, w, width, lane) <= SETTLED:
             return outcome  # type: ignore[no-any-return]
     jammed = FINE

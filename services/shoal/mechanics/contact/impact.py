@@ -64,7 +64,9 @@ def strike(tile: Tile, m: Arrays, w: Work, lane: int, state: Array, plastic: Arr
         if m.gaps.tangents == 0 and not m.gives:
             complementarity.complementary(size, g.matrix, g.load, g.chosen, g.found)
         else:
-            outcome = coulomb.decide(m.gaps, g.given, width, lane, g.chosen, g.way, g.matrix, g.load, g.found, True)
+            outcome = coulomb.decide(
+                m.gaps, g.few, g.given, width, lane, g.chosen, g.way, g.matrix, g.load, g.found, True
+            )
         if outcome == FINE and _gains(m, w, rates):
             outcome = GAINS + TROUBLES * struck(size, width, lane, g.hit)
         if outcome != FINE:
@@ -119,7 +121,10 @@ def _one_by_one(
         first = hits * ways
         for k in range(ways):
             rest[first + k] = _asked(m, width, lane, hits, k, plastic, rates)
-        if coulomb.alone(m.gaps, g.given, hits, width, lane, STICK, mode, way, g.matrix, rest, each, True) != FINE:
+        if (
+            coulomb.alone(m.gaps, g.few, g.given, hits, width, lane, STICK, mode, way, g.matrix, rest, each, True)
+            != FINE
+        ):
             break
         for k in range(ways):
             left[first + k] -= each[first + k]

@@ -170,6 +170,6 @@ def _settle_rubbing(tile: Tile, m: Arrays, w: Work, lane: int, held: Array, part
         right[i] = -g.load[each[i]]
         for j in range(n):
             equations[i * n + j] = g.matrix[each[i] * size + each[j]]
-    coulomb.solve(n, equations, right, found, np.zeros(0))
+    coulomb.solve(n, equations, right, found, np.zeros(n * n))
     for i in range(n):
         g.found[each[i]] = found[i]

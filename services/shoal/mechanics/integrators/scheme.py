@@ -67,7 +67,8 @@ class Scheme(NamedTuple):
     """An integrator as the time loop sees it: addresses of its kernels, storage of its settings, and some of its facts.
 
     forget: 0 where there are no earlier steps to forget. divides: whether its equations are divided by the square of
-    its fixed step, so that a very short one is but round-off. evaluations: the counter of the settings.
+    its fixed step, so that a very short one is but round-off. evaluations: the counter of the settings. suggestion: the
+    next step that an adaptive one would take [s], (1,).
     """
 
     advance: int
@@ -78,6 +79,7 @@ class Scheme(NamedTuple):
     divides: bool
     settings: Array
     evaluations: Array
+    suggestion: Array
 
 
 class Implementation(NamedTuple):
@@ -114,7 +116,8 @@ def connect(tile: Tile, settings: Any, arrays: Arrays, room: Work) -> Scheme:
     step, inside, forget = (address(k) if own[k] else 0 for k in range(3))
     divides = not (own.facts.explicit or own.facts.adaptive)
     facts = own.facts.adaptive, own.facts.mean_power, divides
-    return Scheme(step, inside, forget, *facts, storage, settings.evaluations)
+    suggestion = settings.control.suggestion if own.facts.adaptive else np.zeros(1)
+    return Scheme(step, inside, forget, *facts, storage, settings.evaluations, suggestion)
 
 
 def signatures(tile: Tile, settings: Any, arrays: Arrays, room: Work) -> list[Kernel]:
