@@ -444,6 +444,57 @@ ONLY_NATIVE = [
         initial={"A": {"position": [0.0, 0.8], "velocity": [1.0, 0.0]}},
     ),
     scene(
+        "rolling",
+        {"A": BLOCK},
+        {},
+        {"A": at("A", [0.0, 0.0])},
+        contacts={
+            "floor": {
+                "first": at("A", [0.0, 0.0]) | {"radius": 0.1},
+                "second": GROUND | {"polygon": [[-1.0, -1.0], [1.0, -1.0], [1.0, 0.0], [-1.0, 0.0]]},
+            }
+        },
+        initial={"A": {"position": [0.0, 0.8], "velocity": [1.0, 0.0]}},
+    ),
+    scene(
+        "lifted",
+        {"A": BLOCK},
+        {},
+        {"A": at("A", [0.0, 0.0])},
+        contacts={
+            "cam": {
+                "first": at("A", [0.0, 0.0]) | {"radius": 0.1},
+                "second": GROUND | {"cam": {"table": [[0.0, 0.3], [2.0, 0.32], [4.0, 0.31]], "period": 2.0 * np.pi}},
+            }
+        },
+        initial={"A": {"position": [0.0, 0.8], "velocity": [0.0, 0.0]}},
+    ),
+    scene("motor-rotor", {"A": BLOCK}, {"O": joint(GROUND, at("A")) | {"armature": 0.1}}, {"A": at("A")}),
+    Scene.parse(
+        {
+            "name": "mounted",
+            "dimensions": 3,
+            "bodies": {"A": BLOCK | {"inertia": [0.1, 0.2, 0.2]}},
+            "loads": {"mount": {"kind": "bushing", "first": GROUND, "second": at("A"), "stiffness": [1e3, 1e3, 1e3]}},
+            "markers": {"A": at("A")},
+            "initial": {"A": {"position": [0.0, 0.0, 0.0]}},
+        }
+    ),
+    scene(
+        "hoist",
+        {"A": {"kind": "point-mass", "mass": 1.0}},
+        {
+            "R": joint(
+                GROUND | {"point": [-0.3, -0.5]},
+                at("A"),
+                "rope",
+                over=[GROUND | {"point": [0.0, 0.0], "radius": 0.1, "side": "left"}],
+            )
+        },
+        {"A": at("A")},
+        initial={"A": {"position": [0.1, -0.8], "velocity": [0.0, 0.0]}},
+    ),
+    scene(
         "hose",
         {"A": {"kind": "point-mass", "mass": 1.0}},
         {"D": joint(GROUND, at("A"), "distance", length=0.5)},

@@ -60,8 +60,8 @@ def test_every_engine_does_what_it_says_and_refuses_the_rest(
         assert "\n" not in str(error.value)
 
 
-def test_every_name_is_a_kind_or_a_feature() -> None:
-    assert {"rigid", *JOINT_KINDS, *LOAD_KINDS, *FEATURES} <= set(NAMES)
+def test_every_name_is_a_kind_or_a_feature_and_has_a_machine(scenes: list[Scene]) -> None:
+    assert {"rigid", *JOINT_KINDS, *LOAD_KINDS, *FEATURES} <= set(NAMES) <= set().union(*map(wants, scenes))
     assert all(capabilities.all <= set(NAMES) for capabilities in CAPABILITIES.values())
 
 

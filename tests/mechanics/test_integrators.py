@@ -408,8 +408,8 @@ def test_an_integrator_stays_within_the_room_of_four_states(integrator: str, mon
         room = work_space(*arguments)
         return room._replace(stage=np.concatenate([room.stage, np.full(room.stage.size, 7.0)]))
 
-    def kept(structure: Any) -> Any:
-        block, found = gathered(structure)
+    def kept(*arguments: Any) -> Any:
+        block, found = gathered(*arguments)
         rooms.append(found[0])
         return block, found
 

@@ -58,7 +58,7 @@ def test_each_recording_moves(pages: Callable[[str], str]) -> None:
     data = re.findall(r'<script type="application/json">(.*?)</script>', pages("estimate"), re.DOTALL)
     runs = [json.loads(one) for one in data]
     assert [run["name"] for run in runs] == ["high", "low"]
-    assert all(len(run["outlines"]["AB"]) == len(run["times"]) for run in runs)
+    assert all(len(run["drawing"]["carriers"]["AB"]["place"]) == len(run["times"]) for run in runs)
 
 
 def test_a_study_shows_all_and_the_best_in_full(pages: Callable[[str], str], estimates: dict[str, Estimate]) -> None:

@@ -43,8 +43,7 @@ def test_the_page_of_intervals(intervals: Response, tmp_path: Path) -> None:
     data = page.split('<script type="application/json">')[1].split("</script>")[0]
     moving = json.loads(data)
     assert moving["name"] == "P.y &gt; 1.3" or moving["name"] == "P.y > 1.3"
-    assert set(moving["behind"]) == set(moving["outlines"]) == {"P"}
-    assert moving["behind"] != moving["outlines"]
+    assert set(moving["behind"]) == set(moving["drawing"]["carriers"]) == {"P"}
     assert "Widths, gaps and errors" in page
     assert "exceeded" in page
 

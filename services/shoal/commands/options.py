@@ -89,7 +89,7 @@ def emphasised(scene: Any, out: Out, magnify: float | None, stress: bool) -> dic
     from shoal.pictures.emphasis import Emphasis
     from shoal.pictures.files import DRAWN
 
-    asked = {"magnify": 1.0 if magnify is None else magnify, "stress": stress}
+    asked: dict[str, Any] = {"magnify": 1.0 if magnify is None else magnify, "stress": stress}
     if out is None or out.suffix not in DRAWN:
         raise InputError(
             f"{'stress' if magnify is None else 'magnify'}: is of pictures; add --out with {', '.join(DRAWN)}"

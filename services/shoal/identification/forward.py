@@ -366,7 +366,7 @@ class ForwardModel:
             return accepts(scene, {path: value})
         return self._accepted(path, value)
 
-    def can_be(self, point: Array, name: str) -> bool:
+    def can_be(self, point: Array, name: str | None) -> bool:
         """Return whether a point (parameters,) is a scene in a recording."""
         try:
             self.scene_at(point, name)

@@ -211,7 +211,9 @@ def keep(tile: Tile, gaps: Gaps, g: GapWork, at_event: bool, out: Array, first: 
 
 
 @njit(cache=True, error_model="numpy")
-def look(tile: Tile, gaps: Gaps, z: Array, zdot: Array, g: GapWork, room: Array, every: bool) -> None:
+def look(
+    tile: Tile, gaps: Gaps, z: Array, zdot: Array, g: GapWork, room: Array, every: bool, whole: bool
+) -> None:  # fmt: skip
     """Look at every contact, or at those of which g.looked is not 0 in some lane. See `look_at`."""
     width = len(tile)
     for contact in range(gaps.size):
@@ -219,7 +221,7 @@ def look(tile: Tile, gaps: Gaps, z: Array, zdot: Array, g: GapWork, room: Array,
         for lane in range(width):
             wanted = wanted or g.looked[contact * width + lane] != 0.0
         if wanted:
-            look_at(tile, gaps, contact, z, zdot, g, room, False)
+            look_at(tile, gaps, contact, z, zdot, g, room, whole)
 
 
 @njit(cache=True, error_model="numpy")

@@ -128,9 +128,11 @@ def _least(tile, m, w, t, z, zdot, tolerance, a):  # type: ignore[no-untyped-def
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def look(tile: Tile, m: Arrays, w: Work, z: Array, zdot: Array, every: bool = True) -> None:
+def look(
+    tile: Tile, m: Arrays, w: Work, z: Array, zdot: Array, every: bool = True, whole: bool = False
+) -> None:  # fmt: skip
     """`response.look`."""
-    call(m.table.look, (tile, m, w, z, zdot, every))
+    call(m.table.look, (tile, m, w, z, zdot, every, whole))
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -140,8 +142,8 @@ def decide(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def _look(tile, m, w, z, zdot, every):  # type: ignore[no-untyped-def]
-    response.look(tile, m, w, z, zdot, every)
+def _look(tile, m, w, z, zdot, every, whole):  # type: ignore[no-untyped-def]
+    response.look(tile, m, w, z, zdot, every, whole)
 
 
 @njit(cache=True, error_model="numpy")
@@ -186,7 +188,7 @@ _STATE_KERNELS: dict[str, Kernel] = {
     "constrain": (_constrain, (_NUMBER, _ROWS, _ROWS, _NUMBER, _ROWS)),
     "least": (_least, (_NUMBER, _ROWS, _ROWS, _NUMBER, _ROWS)),
     "settle": (_settle, (_NUMBER, _NUMBER, _COUNT, _FLAG)),
-    "look": (_look, (_ROWS, _ROWS, _FLAG)),
+    "look": (_look, (_ROWS, _ROWS, _FLAG, _FLAG)),
     "contact": (_contact, (_NUMBER, _ROWS, _ROWS, _NUMBER, _ROWS)),
     "hold": (_hold, (_NUMBER, _NUMBER)),
     "decide": (_decide, (_NUMBER, _NUMBER)),

@@ -122,7 +122,7 @@ class Runs:
             count = part.stop - part.start
             tile = SINGLE if count == 1 else WIDE
             spare = HALF if self._halves and 1 < count <= HALF else 0
-            halts, idle = self._workspaces(times, tile, spare, whole)
+            halts, idle = self._workspaces(times, tile, spare, whole, count if self.model.gaps.size else 0)
             space = None if seek is not None or not idle else _taken(idle)
             if space is None:
                 space = Workspace(self.scene.solver, moved, self.choice, tile, part, times, halts, seek, spare, whole)
@@ -244,9 +244,11 @@ class Runs:
         explicit = facts_of(self.choice.name).explicit and not facts_of(self.choice.name).adaptive
         return explicit and self._alike and self.model.flexible > 0 and not self.model.constraints.size
 
-    def _workspaces(self, times: Array, tile: Tile, spare: int, whole: bool) -> tuple[Halts, list[Workspace]]:
-        """Return the breakpoints of a run, and idle workspaces for it."""
-        key = times.tobytes(), len(tile), spare, whole
+    def _workspaces(
+        self, times: Array, tile: Tile, spare: int, whole: bool, lanes: int
+    ) -> tuple[Halts, list[Workspace]]:
+        """Return the breakpoints of a run, and idle workspaces for it; lanes: 0 where it does not matter."""
+        key = times.tobytes(), len(tile), spare, whole, lanes
         found = self._idle.get(key)
         if found is None:
             halts = halting(self.scene.solver, self.model, self.choice.name, float(times[-1]))

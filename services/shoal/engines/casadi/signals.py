@@ -54,7 +54,9 @@ def _value(scene: Scene, tree: PlacedTree, v: Any, node: Node) -> Any:
     if isinstance(node, tuple):
         return OPERATIONS[node[0]](*(_value(scene, tree, v, argument) for argument in node[1:]))
     if isinstance(node, Constant):
-        return scene.signals[node.name].number
+        constant = scene.signals[node.name]
+        assert isinstance(constant, SignalFunction)
+        return constant.number
     if not isinstance(node, Measure):
         return node
     found = _measure(scene, tree, _RATES.get(node.kind, node.kind), node)

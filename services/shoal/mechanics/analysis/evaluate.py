@@ -386,7 +386,7 @@ class Evaluator:
         self._enter(q, v)
         feedback_at(self._arrays, self._room, t)
         followed = self._arrays.followed
-        return signals.register(followed, self._room.signals)[followed.strength[list(self.model.probed)]]
+        return np.asarray(signals.register(followed, self._room.signals)[followed.strength[list(self.model.probed)]])
 
     def probe(self, q: Array, v: Array | None = None, t: float = 0.0) -> Probe:
         """Look at the formulas of the model that are probed, and at how signals that are numbers act on it."""

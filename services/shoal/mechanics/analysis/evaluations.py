@@ -139,6 +139,8 @@ def _elastic(tile, m, w, t, tolerance, out):  # type: ignore[no-untyped-def]
 @njit(cache=True, error_model="numpy")
 def _accelerate(tile, m, w, t, tolerance, out):  # type: ignore[no-untyped-def]
     kernels.acceleration(tile, m, w, t, w.z, w.zdot, tolerance, w.a)
+    if m.gaps.size > 0:  # which touch without a force as well
+        kernels.look(tile, m, w, w.z, w.zdot, True, True)
 
 
 @njit(cache=True, error_model="numpy")

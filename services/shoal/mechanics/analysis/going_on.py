@@ -23,7 +23,7 @@ from shoal.mechanics.numerics.tile import Array, stacked
 from shoal.mechanics.reach import span
 from shoal.scene import Scene
 from shoal.scene.ended import End, mesh_of
-from shoal.scene.signals import refuse_sampled
+from shoal.scene.signals import continuous_states, refuse_sampled
 
 FITS = 1e-6
 """A state may miss the joints by so much, relative to the machine's size and speed: what a run may drift at most."""
@@ -47,8 +47,9 @@ def taken_up(model: Model, state: End) -> Model:
     if missing := sorted(set(scene.states) ^ set(state.states)):
         whose = "the run has" if missing[0] in state.states else "the scene has"
         raise InputError(f"initial.from: states.{missing[0]}: only {whose} such a state")
-    for k, (name, one) in enumerate(scene.states.items()):
-        v[model.unknowns - len(scene.states) + k] = state.states[name] / one.size
+    states = continuous_states(scene)
+    for k, (name, one) in enumerate(states.items()):
+        v[model.unknowns - len(states) + k] = state.states[name] / one.size
     turned = model.signal_angles.copy()
     for k, name in enumerate(measured(model)):
         turned[k] = state.measures.get(name, turned[k])

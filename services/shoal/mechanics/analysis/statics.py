@@ -43,7 +43,7 @@ from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
 from shoal.scene import Attachment, Scene
 from shoal.scene.loads import Torque
-from shoal.scene.signals import following
+from shoal.scene.signals import continuous_states, following
 
 TURN = 0.8
 """Largest turn [rad] of any body or section in one load step."""
@@ -281,7 +281,7 @@ class _Search:
 
     def _restless(self, rates: dict[str, float]) -> Finding:
         """Return the finding that states go on changing. rates: of their sizes [1/s]."""
-        sizes = {name: rate * float(self.scene.states[name].size) for name, rate in rates.items()}
+        sizes = {name: rate * float(continuous_states(self.scene)[name].size) for name, rate in rates.items()}
         changes = ", ".join(f"states.{name} by {rate:.4g}/s" for name, rate in sizes.items())
         return kinds.RESTLESS.found(f"no rest: it goes on changing {changes}", **sizes)
 

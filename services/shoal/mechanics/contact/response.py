@@ -16,10 +16,10 @@ from shoal.mechanics.numerics.tile import Array, Tile
 
 
 @njit(cache=True, error_model="numpy")
-def look(tile: Tile, m: Arrays, w: Work, z: Array, zdot: Array, every: bool) -> None:
+def look(tile: Tile, m: Arrays, w: Work, z: Array, zdot: Array, every: bool, whole: bool) -> None:
     """Values, rates and slips of contacts at a state, see `gaps.look`."""
     _derive(tile, m, z, zdot)
-    gaps.look(tile, m.gaps, z, zdot, w.gaps, w.element, every)
+    gaps.look(tile, m.gaps, z, zdot, w.gaps, w.element, every, whole)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)

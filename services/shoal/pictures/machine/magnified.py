@@ -62,8 +62,8 @@ class Magnified:
         if len(joined) == 1:
             first = min(*joined, (1 - _NEAR) * rod.length)
             second = first + _NEAR * rod.length
-        paths = [self._marks.point(self._side(name, s)) for s in (first, second)]
-        return first, second, *paths
+        one, other = (self._marks.point(self._side(name, s)) for s in (first, second))
+        return first, second, one, other
 
     def _side(self, name: str, s: float) -> Attachment:
         return Attachment(body=name, point=(s, *(0.0,) * (self._scene.dimensions - 1)))

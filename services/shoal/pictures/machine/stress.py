@@ -73,7 +73,8 @@ def stress_along(run: Trajectory, scene: Scene, points: Mapping[str, int]) -> St
             if isinstance(ends, EndForces):
                 along, across = ends.moment, np.zeros_like(ends.moment)
             else:
-                along, across = _bending(ends, None if axes[name] is None else axes[name][:, k])
+                across_axes = axes[name]
+                along, across = _bending(ends, None if across_axes is None else across_axes[:, k])
             section = rod.section_at(ends.s / rod.length)
             value = _largest(rod, section, ends.normal, along, across)
             known = np.isfinite(value)
