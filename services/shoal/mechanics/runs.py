@@ -74,7 +74,7 @@ class Runs:
         self._alone = alone
         self._limits = Limits(scene, model)
         self._turns = _turns(scene, model)
-        self._idle: dict[tuple[bytes, int, int, bool], tuple[Halts, list[Workspace]]] = {}
+        self._idle: dict[tuple[bytes, int, int, bool, int], tuple[Halts, list[Workspace]]] = {}
         self._found: dict[bool, bytes] = {}
         self._alike = not model.varies
 
