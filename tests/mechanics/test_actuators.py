@@ -11,6 +11,8 @@ import scipy.integrate
 import scipy.linalg
 from controlled import FINE, ground, on_rail, pendulum, rod
 from shoal.errors import InputError
+from shoal.mechanics.analysis.reactions import reactions
+from shoal.mechanics.analysis.statics import statics
 from shoal.mechanics.linear_model import linearize
 from shoal.mechanics.simulate import simulate
 from shoal.scene import Scene
@@ -224,3 +226,21 @@ def test_what_actuators_cannot_hold_to_is_refused() -> None:
         Scene.parse(data)
     with pytest.raises(InputError, match=r"loads.push.joint: 'hinge' is not a slider of this scene; there are rail"):
         Scene.parse(stage(loads={"push": {"kind": "thrust", "joint": "hinge", "force": "3"}}))
+
+
+def test_a_thrust_is_known_to_reactions_and_equilibria() -> None:
+    """A table on a guide of 30 degrees that a servo holds, by its weight along it."""
+    guide = {"kind": "slider", "first": {"body": "ground", "point": [0.0, 0.0]}, "second": {"body": "table"}}
+    data = {
+        "name": "table", "bodies": {"table": {"kind": "rigid-body", "mass": 8.0, "inertia": 0.1}},
+        "joints": {"guide": guide | {"direction": np.pi / 6, "rotation": "locked"}},
+        "actuators": {"lift": {"kind": "servo", "joint": "guide", "position": "0.2", "kp": 3000, "kd": 150}},
+        "markers": {"table": {"body": "table"}}, "initial": {"table": {"position": [0.0, 0.0]}},
+    }  # fmt: skip
+    rest = statics(Scene.parse(data))
+    away = 0.2 - 8.0 * 9.81 * 0.5 / 3000
+    assert rest.ok, rest.message
+    np.testing.assert_allclose(rest.marker("table"), [away * np.sqrt(0.75), away * 0.5], atol=1e-9)
+    (held,) = reactions(Scene.parse(data), [3.0])
+    across = 8.0 * 9.81 * np.sqrt(0.75)
+    assert np.linalg.norm(held.joints["guide"].force) == pytest.approx(across, rel=1e-6)

@@ -220,3 +220,54 @@ def test_what_knows_no_stops_says_so() -> None:
         simulate(rod(integrator="radau5"), np.array([1.0]))
     with pytest.raises(InputError, match=r"joints\.O\.stops: engine tree cannot do stops; use "):
         get_engine("tree").simulate(rod(), np.array([1.0]))
+
+
+JUMPS = {
+    "name": "jumps",
+    "bodies": {"b": {"kind": "rigid-body", "mass": 1.0, "inertia": 0.1}},
+    "contacts": {"floor": {"first": {"body": "b"}, "second": {"body": "ground", "line": 0.0}, "mu": 0.3}},
+    "loads": {
+        "push": {"kind": "force", "at": {"body": "b"}, "force": [1.0, 0.0], "scale": "10*step(t - 0.1)"},
+        "up": {"kind": "force", "at": {"body": "b"}, "force": [0.0, 1.0], "scale": "20*step(t - 0.4)"},
+    },
+    "markers": {"b": {"body": "b"}},
+    "initial": {"b": {"position": [0.0, 0.0], "velocity": [0.0, 0.0]}},
+    "solver": {"duration": 0.5},
+}
+
+
+@pytest.mark.compiles("kernels of contacts, which few machines need")
+@pytest.mark.parametrize("masses", [[1.0], np.linspace(0.5, 1.5, 5)])
+def test_a_force_that_jumps_lets_a_block_slip_and_lifts_it(masses: Any) -> None:
+    """It sticks up to 0.1 s, slips up to 0.4 s, and flies."""
+    run = simulate(Scene.parse(JUMPS), np.array([0.5]), {"bodies.b.mass": np.array(masses)})
+    assert all(status == "ok" for status in run.status)
+    for lane, mass in enumerate(masses):
+        slips, flies = 10.0 / mass - 0.3 * 9.81, 10.0 / mass
+        x = 0.5 * slips * 0.3**2 + slips * 0.3 * 0.1 + 0.5 * flies * 0.1**2
+        y = 0.5 * (20.0 / mass - 9.81) * 0.1**2
+        np.testing.assert_allclose(run.points[0, 0, :2, lane], [x, y], atol=1e-9)
+
+
+@pytest.mark.compiles("kernels of contacts, which few machines need")
+def test_a_rope_does_not_push_where_a_torque_jumps() -> None:
+    data = {
+        "name": "winch",
+        "bodies": {
+            "drum": {"kind": "rigid-body", "mass": 5.0, "inertia": 0.06},
+            "load": {"kind": "point-mass", "mass": 7.0},
+        },
+        "joints": {
+            "axle": {"first": {"body": "ground", "point": [0.0, 0.0]}, "second": {"body": "drum"}},
+            "rope": {"kind": "rope", "second": {"body": "load"},
+                     "first": {"body": "drum", "point": [0.0, 0.0], "radius": 0.3, "side": "right"}},
+        },
+        "loads": {"m": {"kind": "torque", "at": {"body": "drum"}, "torque": "10 - 165*step(t - 0.1)"}},
+        "markers": {"load": {"body": "load"}},
+        "initial": {"drum": {"position": [0.0, 0.0]}, "load": {"position": [0.3, -2.2]}},
+        "solver": {"duration": 0.3},
+    }  # fmt: skip
+    run = simulate(Scene.parse(data), np.array([0.3]))
+    held = (10.0 / 0.3 - 7.0 * 9.81) / (7.0 + 0.06 / 0.3**2)
+    y = -2.2 + held * (0.5 * 0.1**2 + 0.1 * 0.2) - 0.5 * 9.81 * 0.2**2
+    assert run.marker("load")[0, 1] == pytest.approx(y, abs=1e-9)

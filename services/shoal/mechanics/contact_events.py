@@ -309,6 +309,24 @@ def move(tile: Tile, scheme: Scheme, m: Arrays, w: Work, k: LoopRoom, taken: flo
 
 
 @njit(cache=True, error_model="numpy")
+def jumped(tile: Tile, m: Arrays, w: Work) -> float:
+    """Mark closed contacts that forces which have jumped open or let slip; return whether there are some, 1 or 0.
+
+    By the forces of the contacts at the last acceleration: a search within the next step finds no change of sign.
+    """
+    g, width, found = w.gaps, len(tile), 0.0
+    for at in range(m.gaps.size * width):
+        g.hit[at] = 0.0
+        if g.closed[at] == 0.0:
+            continue
+        if _pulls(m, w, width, at):
+            g.hit[at], found = LIFT, 1.0
+        elif m.gaps.rubs[at // width] > 0 and g.mode[at] == STICK and g.margin[at] < 0.0:
+            g.hit[at], found = SLIDE, 1.0
+    return found
+
+
+@njit(cache=True, error_model="numpy")
 def touching(tile: Tile, m: Arrays, w: Work) -> float:
     """Mark the gaps that are closed at the start and do not open; return whether there are some, 1 or 0."""
     g, found = w.gaps, 0.0

@@ -139,6 +139,7 @@ def visit(
         kernels.look(tile, m, room, room.z, room.zdot)
         kernels.acceleration(tile, m, room, begin, room.z, room.zdot, frame.tolerance, room.a)
         own.last_power[0] = room.power[0]
+        progress[EVENT] = contact_events.jumped(tile, m, room)
     progress[BEGUN], progress[DONE], progress[ROOM], progress[CUTS] = 1.0, 0.0, ENDLESS, 0.0
     progress[NOW], progress[ENDING], progress[TAKEN] = begin, end, end - begin
     progress[NUMBER], progress[WHOLE], progress[SAMPLE], progress[HALT] = number, 1.0 if whole else 0.0, sample, halt

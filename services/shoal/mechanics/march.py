@@ -255,6 +255,8 @@ def loop(frame):  # type: ignore[no-untyped-def]
             if frame.first_switch != 0:
                 signals.follow(tile, m, w, now, w.z, w.zdot, w.z, signals.SETTLE)
             _leave_halt(tile, scheme, m, w, k, now, tolerance, record.energy_scale)
+            if m.gaps.size > 0 and len(tile) == 1 and events.jumped(tile, m, w) > 0.0:
+                _leave_event(tile, scheme, m, w, k, now, tolerance, record.energy_scale)
         target = ending if free else min((number + 1) * step, ending)
         halted = halt <= last and halts.times[halt] <= target + snap
         if halted:

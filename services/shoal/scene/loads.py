@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, PrivateAttr
 
 from shoal.scene.function import Function, SignalFunction
 from shoal.scene.joints import Attachment, Direction, Z
@@ -127,6 +128,17 @@ class Thrust(Record):
     """Name of the slider."""
     force: SignalFunction
     """Force [N] as a function of time and signals."""
+    _guide: Any = PrivateAttr(None)
+
+    def along(self, guide: Any) -> Thrust:
+        """Return the same load, which knows its slider where the scene has lost its joints."""
+        found = self.model_copy()
+        found._guide = guide
+        return found
+
+    def guide(self, joints: Mapping[str, Any]) -> Any:
+        """Return its slider."""
+        return joints[self.joint] if self._guide is None else self._guide
 
 
 class DistributedForce(Record):

@@ -30,6 +30,7 @@ from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import Array
 from shoal.scene import Bushing, InitialState, RigidBody, Rod, Scene, SignalFunction
 from shoal.scene.formula import Measure, Node, leaves
+from shoal.scene.loads import Thrust
 from shoal.scene.sampled import Sampled
 from shoal.scene.signals import HeldValue, StateValue, expanded
 
@@ -134,7 +135,16 @@ def _without_joints(scene: Scene, placement: Placement) -> Scene:
         body = scene.bodies[name]
         if isinstance(body, Rod) and body.element == "modal":  # its modes are those of the machine
             bodies[name] = body.model_copy(update={"ends": held(scene, name)})
-    return scene.model_copy(update={"joints": {}, "contacts": {}, "initial": initial, "bodies": bodies})
+    return scene.model_copy(update=_alone(scene) | {"initial": initial, "bodies": bodies})
+
+
+def _alone(scene: Scene) -> dict[str, Any]:
+    """Return no joints and contacts, and loads that need none."""
+    loads = {
+        name: load.along(scene.joints[load.joint]) if isinstance(load, Thrust) else load
+        for name, load in scene.loads.items()
+    }
+    return {"joints": {}, "contacts": {}, "loads": loads}
 
 
 def _without_joints_in_space(scene: Scene, placement: Placement) -> Scene:
@@ -154,7 +164,7 @@ def _without_joints_in_space(scene: Scene, placement: Placement) -> Scene:
         frame = placement.frames[name]
         if isinstance(frame, BeamFrame) and frame.element.director is not None:
             bodies[name] = bodies[name].model_copy(update={"director": "xyz"[frame.element.director]})
-    return scene.model_copy(update={"joints": {}, "contacts": {}, "initial": initial, "bodies": bodies})
+    return scene.model_copy(update=_alone(scene) | {"initial": initial, "bodies": bodies})
 
 
 def _with_inertia(scene: Scene) -> tuple[Scene, dict[str, float]]:

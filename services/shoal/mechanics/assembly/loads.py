@@ -152,7 +152,7 @@ class Loads(Measures):
             self.signals.turn(name, base, load.at, self.signals.strength(f"loads.{name}.torque", node))
 
     def _thrust(self, name: str, load: Thrust) -> None:
-        joint = self.scene.joints[load.joint]
+        joint = load.guide(self.scene.joints)
         assert isinstance(joint, Slider)
         line = self.placement.line(joint.first, joint.direction if joint.axis is None else joint.axis)
         ends = [self.placement.point(self.scene, side) for side in (joint.first, joint.second)]
