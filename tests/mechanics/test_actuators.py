@@ -234,7 +234,7 @@ def test_a_thrust_is_known_to_reactions_and_equilibria() -> None:
     data = {
         "name": "table", "bodies": {"table": {"kind": "rigid-body", "mass": 8.0, "inertia": 0.1}},
         "joints": {"guide": guide | {"direction": np.pi / 6, "rotation": "locked"}},
-        "actuators": {"lift": {"kind": "servo", "joint": "guide", "position": "0.2", "kp": 3000, "kd": 150}},
+        "actuators": {"lift": {"kind": "servo", "joint": "guide", "position": 0.2, "kp": 3000, "kd": 150}},
         "markers": {"table": {"body": "table"}}, "initial": {"table": {"position": [0.0, 0.0]}},
     }  # fmt: skip
     rest = statics(Scene.parse(data))

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from shoal.scene.joints import GROUND
-from shoal.scene.record import NonNegative, Positive, Record
+from shoal.scene.record import Formula, NonNegative, Positive, Record
 
 Parts = tuple[dict[str, Any], dict[str, Any]]
 """Signals and states by name."""
@@ -70,7 +70,7 @@ class Motor(Actuator):
     """A motor whose torque is given."""
 
     kind: Literal["motor"] = "motor"
-    torque: str
+    torque: Formula
     """Torque of the rotor [N m], a formula of time, measures and signals."""
 
     def law(self, name: str, place: str, rate: str) -> tuple[dict[str, Any], dict[str, Any], str]:
@@ -82,7 +82,7 @@ class DcMotor(Actuator):
     """A motor with brushes, or one without in the axis of its torque: L di/dt = u - R i - k N rate, torque N k i."""
 
     kind: Literal["dc-motor"] = "dc-motor"
-    voltage: str
+    voltage: Formula
     """Voltage u [V], a formula of time, measures and signals, also of NAME_current, its current [A]."""
     resistance: Positive
     """Resistance R [ohm]."""
@@ -110,9 +110,9 @@ class Servo(Actuator):
     """A drive that holds a place or a speed: kp (position - place) + kd (velocity - rate)."""
 
     kind: Literal["servo"] = "servo"
-    position: str | None = None
+    position: Formula | None = None
     """Wanted angle or place of the joint [rad; m], a formula."""
-    velocity: str | None = None
+    velocity: Formula | None = None
     """Wanted speed [rad/s; m/s], a formula; beside a position by default 0."""
     kp: NonNegative | None = None
     """Torque by the error of the position [N m/rad; N/m]."""

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, TypeAdapter, ValidationError, model_validator
 
 from shoal.scene.actuators import Actuator, AnyActuator, acting
-from shoal.scene.record import Positive, Record, one_line
+from shoal.scene.record import Formula, Positive, Record, one_line
 from shoal.scene.sampled import Sampling
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
@@ -36,7 +36,7 @@ class Pid(Record):
     """A PID controller: kp error + ki times its integral + kd times its rate, within limits."""
 
     kind: Literal["pid"] = "pid"
-    of: str
+    of: Formula
     """The error, a formula of measures and signals."""
     kp: float = 0.0
     """Gain of the error [1]."""
@@ -44,7 +44,7 @@ class Pid(Record):
     """Gain of its integral [1/s]."""
     kd: float = 0.0
     """Gain of its rate [s]."""
-    rate: str | None = None
+    rate: Formula | None = None
     """The rate of the error, a formula such as `-rate(hinge)`; left out it is the filtered difference of the error."""
     filter: Positive | None = None
     """Time constant of a filter of the rate [s]."""
@@ -174,7 +174,7 @@ class TransferFunction(Record):
     """A transfer function num/den of s, or of z if it is sampled, by polynomials, highest power first, from rest."""
 
     kind: Literal["transfer-function"] = "transfer-function"
-    of: str
+    of: Formula
     """Its input, a formula of measures and signals."""
     num: Annotated[tuple[float, ...], Field(min_length=1)]
     """Coefficients of the numerator [1]."""

@@ -12,6 +12,7 @@ import math
 import re
 import warnings
 from collections.abc import Callable, Mapping
+from difflib import get_close_matches
 from functools import lru_cache, reduce
 from types import MappingProxyType
 from typing import Any
@@ -135,7 +136,7 @@ def _check(tree: ast.Expression, text: str, measures: Mapping[str, int]) -> None
             if (found := measured(node, measures)) and isinstance(node, ast.Call):
                 _check_measure(found, node, measures[found[0]])
             elif isinstance(node, ast.Call):
-                _check_call(node, text)
+                _check_call(node, text, measures)
                 inner += node.args
             else:
                 _check_plain(node, text)
@@ -158,7 +159,7 @@ def _check_plain(node: ast.AST, text: str) -> None:
         raise InputError(f"expression: {text!r} has {found}; use numbers, names, + - * / ** and functions")
 
 
-def _check_call(node: ast.Call, text: str) -> None:
+def _check_call(node: ast.Call, text: str, measures: Mapping[str, int]) -> None:
     name = node.func.id if isinstance(node.func, ast.Name) else None
     if name in AT_ONCE:
         raise InputError(
@@ -166,7 +167,10 @@ def _check_call(node: ast.Call, text: str) -> None:
             "known in formulas. Take rates, or what a state or a sample keeps of them"
         )
     if name not in ONE and name not in MANY:
-        raise InputError(f"expression: {text!r} calls what is none of {', '.join([*ONE, *MANY])}")
+        known = [*ONE, *MANY, *measures]
+        near = get_close_matches(name or "", known, 1)
+        hint = f"; did you mean {near[0]}?" if near else ""
+        raise InputError(f"expression: {text!r} calls what is none of {', '.join(known)}{hint}")
     if node.keywords or (len(node.args) != 1 if name in ONE else len(node.args) < 2):
         raise InputError(f"expression: {name} takes {'one number' if name in ONE else 'two numbers or more'}")
 

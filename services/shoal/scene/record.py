@@ -25,6 +25,15 @@ from shoal.errors import InputError
 _MAY_HOLD_TRUTH = (bool, dict, list, tuple)
 
 
+def _formula(given: Any) -> Any:
+    """Return the text of a number; anything else as it is given."""
+    return repr(given) if type(given) in (int, float) else given
+
+
+Formula = Annotated[str, BeforeValidator(_formula)]
+"""A formula of measures and signals, or a number."""
+
+
 class Base(BaseModel):
     """Base of input models: true and false (in YAML also yes, no, on, off) are refused in place of a number."""
 
