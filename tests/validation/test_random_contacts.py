@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from shoal_validation.random_contacts.machines import pushed
 from shoal_validation.random_contacts.study import judged
 
 MENDED = 40, 100, 114, 115
@@ -15,6 +16,13 @@ MENDED = 40, 100, 114, 115
 )
 def test_a_machine_drawn_at_random_moves_as_newton_and_euler_say(seed: int) -> None:
     assert judged(seed).verdict in (("right",) if seed in MENDED else ("right", "refused", "not judged"))
+
+
+@pytest.mark.compiles("kernels of contacts, which few machines need")
+@pytest.mark.parametrize("seed", [0, 2, 3, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(4, 30))])
+def test_contacts_open_and_slip_where_forces_jump(seed: int) -> None:
+    verdict = judged(seed, pushed).verdict
+    assert verdict in (("right",) if seed < 4 else ("right", "refused", "not judged"))
 
 
 @pytest.mark.slow  # half a minute

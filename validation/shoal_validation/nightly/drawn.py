@@ -10,6 +10,7 @@ import numpy as np
 from shoal_validation.benchmarks.timing import undisturbed
 from shoal_validation.nightly.line import Line
 from shoal_validation.nightly.measure import Measured
+from shoal_validation.random_contacts.machines import pushed
 from shoal_validation.random_contacts.study import judged as with_contacts
 from shoal_validation.random_feedback.study import judged as under_feedback
 from shoal_validation.random_machines import WRONG, Judged
@@ -24,6 +25,7 @@ def lines() -> Iterator[Line]:
     reason = "no machine may be further from the judge than three times its estimated error"
     for name, judged, source in (
         ("contacts", with_contacts, "Newton's and Euler's equations, every mode of contacts tried"),
+        ("jumps", partial(with_contacts, machine_of=pushed), "the same, under forces that begin and end at once"),
         ("feedback", under_feedback, "Lagrange's equations, formulas by Python, DOP853 of scipy"),
     ):
         yield Line(f"random/{name}", "gauss", "default", 0.0, reason, partial(wrong, judged), source,

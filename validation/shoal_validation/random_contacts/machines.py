@@ -19,6 +19,20 @@ def drawn(seed: int) -> tuple[str, Data]:
     return name, {"name": f"{name}-{seed}", "solver": {"duration": DURATION}, **found}
 
 
+def pushed(seed: int) -> tuple[str, Data]:
+    """Return the same with a force and a torque on each body that begin at some time and end at another."""
+    kind, data = drawn(seed)
+    random, loads = np.random.default_rng([seed, 1]), {}
+    for name, body in data["bodies"].items():
+        begin, end = sorted(random.uniform(0.0, DURATION, 2).round(3).tolist())
+        lasts = f"step(t - {begin}) - step(t - {end})"
+        force = (15.0 * body["mass"] * random.uniform(-1.0, 1.0, 2)).tolist()
+        loads[f"push-{name}"] = {"kind": "force", "at": {"body": name}, "force": force, "scale": lasts}
+        torque = 20.0 * body["inertia"] * random.uniform(-1.0, 1.0)
+        loads[f"turn-{name}"] = {"kind": "torque", "at": {"body": name}, "torque": f"{torque}*({lasts})"}
+    return kind, {**data, "loads": loads}
+
+
 def _law(random: Any) -> Data:
     """Restitution and friction, each absent at times."""
     kept = float(random.choice([0.0, random.uniform(0.2, 0.95)], p=[0.25, 0.75]))

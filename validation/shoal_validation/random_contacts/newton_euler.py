@@ -7,6 +7,7 @@ and forces, or the machine is not judged. Between events SciPy's DOP853.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise, product
 from typing import Any
@@ -45,11 +46,27 @@ class NewtonEuler:
             start = scene["initial"][name]
             self.q[3 * k : 3 * k + 3] = [*start["position"], start.get("angle", 0.0)]
             self.v[3 * k : 3 * k + 3] = [*start.get("velocity", (0.0, 0.0)), start.get("rate", 0.0)]
+        self.weight, self.jumps = self.force, self._pulses(scene.get("loads", {}))
         self.pins = list(scene.get("joints", {}).values())
         self.contacts = list(scene["contacts"].items())
         self.closed: dict[int, int] = {}
         self.events: list[tuple[float, str]] = []
         self.decisions = 0
+
+    def _pulses(self, loads: Mapping[str, Any]) -> list[tuple[float, Array]]:
+        """Return when forces on the bodies jump, and what is added to them then."""
+        found = []
+        for load in loads.values():
+            k = 3 * self.names.index(load["at"]["body"])
+            change = np.zeros(len(self.q))
+            if load["kind"] == "force":
+                change[k : k + 2], law = load["force"], load["scale"]
+            else:
+                size, law = load["torque"].split("*", 1)
+                change[k + 2] = float(size)
+            begin, end = map(float, re.findall(r"t - ([0-9.]+)", law))
+            found += [(begin, change), (end, -change)]
+        return sorted(found, key=lambda jump: jump[0])
 
     # Kinematics: a place is a body and its coordinates; vectors may be complex, for derivatives along a motion.
 
@@ -280,8 +297,9 @@ class NewtonEuler:
         touching = {k for k in range(len(self.contacts)) if self.surfaces(k, self.q)[0] < 1e-9}
         self._decide(0.0, {k for k in touching if self.surfaces(k, self.q)[1] @ self.v < 1e-12}, touching, {})
         self.events.clear()
-        sample, end = 0, float(times[-1])
-        while t < end and len(self.events) < most:
+        sample, last_time = 0, float(times[-1])
+        while t < last_time and len(self.events) < most:
+            end = min([last_time, *(jump for jump, _ in self.jumps if jump > t)])
             solver = DOP853(
                 lambda _, y: np.concatenate([y[n:], self.acceleration(y[:n], y[n:])[0]]), t,
                 np.concatenate([self.q, self.v]), end, rtol=1e-12, atol=1e-13, max_step=STEP,
@@ -309,9 +327,11 @@ class NewtonEuler:
                     sample += 1
                 y = inside(last)
             t, self.q, self.v = float(last), y[:n], y[n:]
-            if not event:
-                break
-            self._leave(t, event)
+            if event:
+                self._leave(t, event)
+            elif t < last_time:
+                self.force = self.weight + sum(change for jump, change in self.jumps if jump <= t)
+                self._decide(t, set(), {k for k, mode in self.closed.items() if mode == STICK}, {})
         return out
 
     def _leave(self, t: float, event: Sequence[tuple[str, int]]) -> None:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from shoal.engines import get_engine
 from shoal.engines.verification import verified
 from shoal.errors import InputError
 from shoal.scene import Scene
 
-from shoal_validation.random_contacts.machines import DURATION, drawn
+from shoal_validation.random_contacts.machines import DURATION, Data, drawn
 from shoal_validation.random_contacts.newton_euler import NewtonEuler, UndecidedError
 from shoal_validation.random_machines import WRONG, Judged
 
@@ -19,9 +21,9 @@ KNOWN = 1e-8
 TIMES = np.linspace(0.0, DURATION, 61)[1:]
 
 
-def judged(seed: int) -> Judged:
+def judged(seed: int, machine_of: Callable[[int], tuple[str, Data]] = drawn) -> Judged:
     """Run the machine of a seed, with the estimate of its errors, and judge it."""
-    kind, data = drawn(seed)
+    kind, data = machine_of(seed)
     try:
         run = verified(get_engine("gauss"), Scene.parse(data), TIMES)
     except InputError as error:
