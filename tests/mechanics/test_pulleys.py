@@ -12,7 +12,7 @@ from shoal.errors import InputError
 from shoal.mechanics.analysis.modes import modes
 from shoal.mechanics.analysis.reactions import reactions
 from shoal.mechanics.analysis.statics import statics
-from shoal.mechanics.rope_path import rope_path
+from shoal.mechanics.rope_path import spans, tangents, wraps
 from shoal.mechanics.simulate import simulate
 from shoal.notebook import sweep
 from shoal.scene import Scene
@@ -244,13 +244,14 @@ def test_in_space_a_rope_goes_over_eyes(keeps: str) -> None:
 
 def test_the_path_of_a_rope_is_as_long_as_its_spans_and_arcs() -> None:
     centres = np.array([[[-0.1, -1.0], [0.0, 0.0], [1.0, 0.0], [1.0 + 0.2, -2.0]]])
-    (path,) = rope_path(centres, [0.0, -0.1, -0.2, 0.0])
-    length = np.sum(np.linalg.norm(np.diff(path, axis=0), axis=1))
+    radii = [0.0, -0.1, -0.2, 0.0]
+    begin, end = spans(centres, radii)
+    along, _ = tangents(centres, radii)
+    straight = np.sum(np.linalg.norm(end - begin, axis=-1))
     slope = np.arcsin(0.1)
     exact = 1.0 + 0.1 * (np.pi / 2 - slope) + np.sqrt(1.0 - 0.1**2) + 0.2 * (np.pi / 2 + slope) + 2.0
-    assert length == pytest.approx(exact, rel=1e-4)
-    (turned,) = rope_path(centres, [0.0, -0.1, -0.2, 0.0], [0, 1])
-    assert np.sum(np.linalg.norm(np.diff(turned, axis=0), axis=1)) == pytest.approx(exact + 0.4 * np.pi, rel=1e-3)
+    assert straight + wraps(along, radii, [0, 0])[0] @ [0.1, 0.2] == pytest.approx(exact, rel=1e-12)
+    assert straight + wraps(along, radii, [0, 1])[0] @ [0.1, 0.2] == pytest.approx(exact + 0.4 * np.pi, rel=1e-12)
 
 
 BAD: dict[str, tuple[dict[str, Any], str]] = {

@@ -271,3 +271,31 @@ def test_a_rope_does_not_push_where_a_torque_jumps() -> None:
     held = (10.0 / 0.3 - 7.0 * 9.81) / (7.0 + 0.06 / 0.3**2)
     y = -2.2 + held * (0.5 * 0.1**2 + 0.1 * 0.2) - 0.5 * 9.81 * 0.2**2
     assert run.marker("load")[0, 1] == pytest.approx(y, abs=1e-9)
+
+
+@pytest.mark.compiles("kernels of contacts, which few machines need")
+@pytest.mark.parametrize("masses", [[1.0], np.linspace(0.5, 1.5, 5)])
+@pytest.mark.parametrize(
+    ("ground", "kept", "expected"),
+    [
+        ({"y": "0.5*max(t - 0.1, 0)"}, 0.0, [0.0, 0.5 * 0.05]),
+        ({"y": "0.5*max(t - 0.1, 0)"}, 0.6, [0.0, 0.8 * 0.05 - 0.5 * 9.81 * 0.05**2]),
+        ({"y": "-2*max(t - 0.1, 0)"}, 0.0, [0.0, -0.5 * 9.81 * 0.05**2]),
+        ({"x": "0.5*max(t - 0.1, 0)"}, 0.0, [0.5 * 0.3 * 9.81 * 0.05**2, 0.0]),
+        ({"x": "0.5*max(t - 0.05, 0) - 1.2*max(t - 0.1, 0)"}, 0.0, [0.3 * 9.81 * 0.05**2, 0.0]),
+    ],
+    ids=["lifted", "thrown", "left", "dragged", "dragged-back"],
+)
+def test_a_block_on_ground_whose_speed_jumps(
+    ground: dict[str, str], kept: float, expected: list[float], masses: Any
+) -> None:
+    """It is struck from below, left behind, or slips until the friction has the speed of the ground."""
+    floor = {"first": {"body": "b"}, "second": {"body": "ground", "point": "table", "line": 0.0}, "mu": 0.3}
+    data = JUMPS | {
+        "loads": {}, "contacts": {"floor": floor | {"restitution": kept}},
+        "ground_points": {"table": {"x": 0.0, "y": 0.0} | ground}, "solver": {"duration": 0.15},
+    }  # fmt: skip
+    run = simulate(Scene.parse(data), np.array([0.15]), {"bodies.b.mass": np.array(masses)})
+    assert all(status == "ok" for status in run.status), run.message
+    for lane in range(len(masses)):
+        np.testing.assert_allclose(run.points[0, 0, :2, lane], expected, atol=1e-9)

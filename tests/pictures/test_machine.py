@@ -14,10 +14,10 @@ from PIL import Image
 from shoal.cli import main
 from shoal.engines import get_engine
 from shoal.errors import InputError
+from shoal.mechanics.rope_path import spans
 from shoal.pictures.emphasis import Emphasis
 from shoal.pictures.machine import shapes
 from shoal.pictures.machine.drawing import Symbol
-from shoal.pictures.machine.ropes import span
 from shoal.pictures.machine.sheet import unit_of
 from shoal.pictures.motion import DrawnMotion, plain_motion, scene_motion
 from shoal.pictures.poses import poses
@@ -296,7 +296,7 @@ def test_spans_of_a_rope_touch_its_pulleys() -> None:
         np.testing.assert_allclose(path(found, "rope", "rope", number)[..., 0], x, atol=1e-9)
     one, other = np.array([[0.0, 0.0]]), np.array([[1.0, 0.5]])
     for radii in ((0.2, 0.1), (0.2, -0.1), (-0.3, 0.2)):
-        begin, end = span(one, other, radii)
+        begin, end = (ends[:, 0] for ends in spans(np.stack([one, other], axis=1), radii))
         way = (end - begin)[0]
         for centre, place, radius in ((one, begin, radii[0]), (other, end, radii[1])):
             away = (centre - place)[0]

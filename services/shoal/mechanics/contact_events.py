@@ -310,20 +310,38 @@ def move(tile: Tile, scheme: Scheme, m: Arrays, w: Work, k: LoopRoom, taken: flo
 
 @njit(cache=True, error_model="numpy")
 def jumped(tile: Tile, m: Arrays, w: Work) -> float:
-    """Mark closed contacts that forces which have jumped open or let slip; return whether there are some, 1 or 0.
+    """Mark closed contacts that forces or driven rates which have jumped open, let slip or strike; 1 if some do, or 0.
 
-    By the forces of the contacts at the last acceleration: a search within the next step finds no change of sign.
+    By their rates and forces at the last acceleration: a search within the next step finds no change of sign.
     """
     g, width, found = w.gaps, len(tile), 0.0
     for at in range(m.gaps.size * width):
         g.hit[at] = 0.0
         if g.closed[at] == 0.0:
             continue
-        if _pulls(m, w, width, at):
-            g.hit[at], found = LIFT, 1.0
-        elif m.gaps.rubs[at // width] > 0 and g.mode[at] == STICK and g.margin[at] < 0.0:
-            g.hit[at], found = SLIDE, 1.0
+        still = STILL * fastest(m, w, width, at % width)
+        moves = m.gaps.soft[at // width] == RIGID and abs(g.rate[at]) > still
+        if moves and g.rate[at] < 0.0:
+            g.hit[at] = HIT
+        elif moves or _pulls(m, w, width, at):
+            g.hit[at] = LIFT
+        elif m.gaps.rubs[at // width] > 0:
+            sticks, past = g.mode[at] == STICK, g.margin[at] < 0.0
+            if sticks and past:
+                g.hit[at] = SLIDE
+            elif past or (sticks and _slip(m, w, width, at) > still):  # the way it goes on follows from its slip
+                g.hit[at] = STOP
+        found = 1.0 if g.hit[at] != 0.0 else found
     return found
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _slip(m: Arrays, w: Work, width: int, at: int) -> float:
+    """Return the speed of slip of a contact [m/s or rad/s]."""
+    square, ways = 0.0, 1 + m.gaps.tangents
+    for k in range(1, ways):
+        square += w.gaps.slip[(at // width * ways + k) * width + at % width] ** 2
+    return np.sqrt(square)  # type: ignore[no-any-return]
 
 
 @njit(cache=True, error_model="numpy")

@@ -6,11 +6,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from shoal.mechanics.rope_path import spans
 from shoal.pictures.machine import shapes
 from shoal.pictures.machine.marks import Marks, between
 from shoal.pictures.machine.sheet import Part, Sheet
 from shoal.scene.ropes import Rope
-from shoal.trajectory import Array
 
 
 def ropes(marks: Marks) -> Iterator[Part]:
@@ -18,20 +18,6 @@ def ropes(marks: Marks) -> Iterator[Part]:
     for name, joint in marks.scene.joints.items():
         if isinstance(joint, Rope):
             yield _rope(marks, name, joint)
-
-
-def span(one: Array, other: Array, radii: tuple[float, float]) -> tuple[Array, Array]:
-    """Return where a span leaves one circle and meets another [m], (frames, 2) each.
-
-    one, other: the centres [m], (frames, 2); radii [m]: positive where the centre is on the left of the rope. The
-    centres are apart across the rope by the difference of the radii.
-    """
-    apart = other - one
-    away = np.linalg.norm(apart, axis=1)
-    lean = np.arcsin(np.clip((radii[1] - radii[0]) / np.where(away > 0, away, 1.0), -1.0, 1.0))
-    angle = np.arctan2(apart[:, 1], apart[:, 0]) - lean
-    left = np.stack([-np.sin(angle), np.cos(angle)], axis=1)
-    return one - radii[0] * left, other - radii[1] * left
 
 
 def _rope(marks: Marks, name: str, joint: Rope) -> Part:
@@ -48,9 +34,9 @@ def _rope(marks: Marks, name: str, joint: Rope) -> Part:
                 sheet.carried(name, "spoke", np.array([(-abs(radius), 0.0), (abs(radius), 0.0)]), frame)
             elif 0 < k < len(radii) - 1:
                 sheet.carried(name, "pin", shapes.circle(shapes.PIN * sheet.unit), frame)
+        line = np.array([(0.0, 0.0), (1.0, 0.0)])
+        begin, end = spans(np.stack(centres, axis=1), radii)
         for k in range(len(radii) - 1):
-            one, other = span(centres[k], centres[k + 1], (radii[k], radii[k + 1]))
-            line = np.array([(0.0, 0.0), (1.0, 0.0)])
-            sheet.add(name, "rope", line, f"{name} span {k}", between(one, other))
+            sheet.add(name, "rope", line, f"{name} span {k}", between(begin[:, k], end[:, k]))
 
     return draw
