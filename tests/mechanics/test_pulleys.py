@@ -278,3 +278,11 @@ def test_other_engines_refuse_ropes_by_name() -> None:
     flat = {n: (m, [*x, 0.0], [*v, 0.0]) for n, (m, x, v) in WEIGHTS.items()}
     with pytest.raises(InputError, match=r"joints.rope.over.0.radius: in space a rope goes over eyes"):
         hung(flat, {"over": [pulley()]}, dimensions=3)
+
+
+def test_a_rope_that_is_watched_by_its_tension_refuses_samples_in_its_own_words() -> None:
+    law = {"f": {"kind": "force", "at": {"body": "a"}, "force": [0.0, 1.0], "scale": "u"}}
+    sampled = {"u": {"sample": "position(a, y)", "period": 0.01}}
+    scene = hung(WEIGHTS, {"over": [pulley()], "keeps": "exactly"}, loads=law, signals=sampled)
+    with pytest.raises(InputError, match=r"^signals.u: sampled every 0.01 s: joints.rope.keeps: exactly is watched"):
+        simulate(scene, np.array([0.1]))

@@ -15,6 +15,7 @@ from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.rope_path import ROUND, tangents, wraps
 from shoal.mechanics.states import States
 from shoal.scene.ropes import Rope
+from shoal.scene.signals import refuse_sampled
 from shoal.trajectory import Trajectory
 
 SAMPLES = 201
@@ -28,14 +29,17 @@ PUSHES = 1e-6
 def run_watched(run: Callable[[Array], Trajectory], times: Array, scene: Any, whole: bool) -> Trajectory:
     """Return a motion at `times` [s], with what is found out about its ropes at more of them.
 
-    run: returns the motion at given times, with its states; whole: whether the result keeps these
+    run: returns the motion at given times, with its states; whole: whether the result keeps these. Raises InputError.
     """
+    ropes = {name: joint for name, joint in scene.joints.items() if isinstance(joint, Rope)}
+    for name in (name for name, rope in ropes.items() if rope.keeps == "exactly"):
+        why = "is watched by its tension, which is known of laws in continuous time only; let it keep at-most"
+        refuse_sampled(scene, f"joints.{name}.keeps: exactly {why}")
     every = np.union1d(times, np.linspace(0.0, float(times[-1]), SAMPLES))
     found = run(every)
     chosen = np.searchsorted(every, times)
     states = found.states
     findings = [list(one) for one in found.lane_findings] or [[] for _ in range(found.lanes)]
-    ropes = {name: joint for name, joint in scene.joints.items() if isinstance(joint, Rope)}
     for lane, one in _found(states, every, ropes):
         findings[lane].append(one)
     model = dict(found.model)
