@@ -14,7 +14,7 @@ from shoal.mechanics import kernels
 from shoal.mechanics.contact import response
 from shoal.mechanics.contact.impact import STILL, fastest
 from shoal.mechanics.dynamics import Work
-from shoal.mechanics.gaps import DRY, HIT, LIFT, PASS, RIGID, SLIDE, SLIP, STICK, STOP, is_outline
+from shoal.mechanics.gaps import DRY, HIT, LIFT, PASS, RIGID, SLIDE, SLIP, STICK, STOP, exceeded, is_outline
 from shoal.mechanics.integrators.dense import quintic
 from shoal.mechanics.integrators.scheme import Scheme, interpolate
 from shoal.mechanics.marched import LoopRoom
@@ -323,14 +323,11 @@ def jumped(tile: Tile, m: Arrays, w: Work) -> float:
         moves = m.gaps.soft[at // width] == RIGID and abs(g.rate[at]) > still
         if moves and g.rate[at] < 0.0:
             g.hit[at] = HIT
-        elif moves or _pulls(m, w, width, at):
-            g.hit[at] = LIFT
-        elif m.gaps.rubs[at // width] > 0:
-            sticks, past = g.mode[at] == STICK, g.margin[at] < 0.0
-            if sticks and past:
-                g.hit[at] = SLIDE
-            elif past or (sticks and _slip(m, w, width, at) > still):  # the way it goes on follows from its slip
-                g.hit[at] = STOP
+        else:
+            g.hit[at] = LIFT if moves else exceeded(m.gaps, g, width, at)
+        if g.hit[at] == 0.0 and m.gaps.rubs[at // width] > 0:
+            turns = g.margin[at] < 0.0 or (g.mode[at] == STICK and _slip(m, w, width, at) > still)
+            g.hit[at] = STOP if turns else 0.0  # the way it goes on follows from its slip
         found = 1.0 if g.hit[at] != 0.0 else found
     return found
 

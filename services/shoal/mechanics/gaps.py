@@ -292,6 +292,22 @@ def _look_at_pair(
     g.rate[contact * width + lane] = g.slip[contact * ways * width + lane]
 
 
+@njit(cache=True, error_model="numpy", forceinline=True)
+def exceeded(gaps: Gaps, g: GapWork, width: int, at: int) -> float:
+    """Return LIFT of a closed contact that would have to pull, SLIDE of one that sticks beyond its limit, 0 of others.
+
+    By the forces of the last acceleration.
+    """
+    opens = gaps.soft[at // width] == RIGID or g.rate[at] > 0.0
+    if (
+        gaps.kind[at // width] != DRY
+        and opens
+        and g.force[at // width * (1 + gaps.tangents) * width + at % width] < 0.0
+    ):
+        return LIFT
+    return SLIDE if gaps.rubs[at // width] > 0 and g.mode[at] == STICK and g.margin[at] < 0.0 else 0.0
+
+
 @njit(cache=True, error_model="numpy")
 def slip_along(gaps: Gaps, g: GapWork, contact: int, width: int, lane: int) -> float:
     """Return the slip rate along the direction in which a contact has slipped [m/s or rad/s]."""

@@ -516,7 +516,7 @@ def _states(slopes: Array) -> tuple[list[int], Array]:
 
 
 def _poles(roots: Roots, count: int, *, paired: bool) -> Complex:
-    """Return so many poles [1/s], slowest first. paired: whether each root that grows has one that decays."""
+    """Return `count` poles [1/s], slowest first. paired: whether each root that grows has one that decays."""
     values = roots.values[np.abs(roots.values) > 0.0]
     found = [values, np.conj(values[values.imag > 0])]
     if paired:

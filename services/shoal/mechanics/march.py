@@ -144,7 +144,7 @@ class March:
 
     @property
     def addresses(self) -> list[int]:
-        """Where `lane_events` finds the march of one lane."""
+        """Addresses by which `lane_events` finds the march of one lane."""
         frame = self.frame
         visit = kernels.address(("visit", len(frame.tile)), lambda: lane_events.visit_kernel(frame))
         places = (array.ctypes.data for array in (self._storage, frame.record.samples, frame.record.contacts))

@@ -124,7 +124,7 @@ def _kept(found: Any, holds: Any) -> tuple[float, ...]:
 
 @dataclass(frozen=True)
 class Required:
-    """What a margin must be: more, or less, than a number."""
+    """A bound on a margin, from below or above."""
 
     text: str
     quantity: str

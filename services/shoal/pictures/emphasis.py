@@ -1,4 +1,4 @@
-"""What a picture of a motion emphasises: deflection by a factor, stress by colour."""
+"""Emphasis of a picture of a motion: deflection magnified by a factor, stress by colour."""
 
 from __future__ import annotations
 

@@ -88,7 +88,7 @@ class DrawnMotion:
 
     @property
     def seats(self) -> dict[str, Array]:
-        """Where markers are drawn [m], (frames, d)."""
+        """Places at which markers are drawn [m], (frames, d)."""
         return self.drawn_markers or self.markers
 
     @property

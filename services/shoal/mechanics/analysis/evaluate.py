@@ -88,7 +88,7 @@ class Probe(NamedTuple):
 
 
 class Pressing(NamedTuple):
-    """What contacts exert at a state.
+    """Forces of contacts at a state.
 
     force: along their normal and tangents [N or N m], (contacts, 3); mode: `gaps.STICK` or `gaps.SLIP` of those that
     rub, (contacts,); axes: normal and tangents of pairs of surfaces, (contacts, 3, 3); gap [m or rad], and of pairs its
@@ -103,7 +103,7 @@ class Pressing(NamedTuple):
 
 
 class Sticking(NamedTuple):
-    """What keeps a machine at rest, with friction by the forces that runs begin with.
+    """Forces of contacts that hold a machine at rest, with friction.
 
     acceleration: that is left, (unknowns,); rows: gradients along which contacts hold it, (rows, unknowns); share: of
     the limit of its friction that each contact takes, (contacts,).
@@ -160,7 +160,7 @@ class Evaluator:
 
     @cached_property
     def weight(self) -> float:
-        """The mass [kg m^2] by which states weigh: so many of their sizes count as the machine's size."""
+        """Mass of a state of the user [kg m^2], of which `SIZES` sizes count as the machine's size."""
         scene = self.model.scene
         mass = sum(float(np.max(body.mass)) for body in scene.bodies.values())
         return mass * (span(scene) / SIZES) ** 2
@@ -233,7 +233,7 @@ class Evaluator:
 
     @property
     def pressing(self) -> Pressing:
-        """What contacts exert at the state of the last acceleration."""
+        """Forces of contacts at the state of the last acceleration."""
         g, size = self._room.gaps, self.gaps.size
         force, ways = np.zeros((size, 3)), 1 + self.gaps.tangents
         force[:, :ways] = np.where(g.closed[:, None] != 0.0, g.force.reshape(size, ways), 0.0)
@@ -241,7 +241,7 @@ class Evaluator:
         return self._exerting(force, g.mode * (g.closed != 0.0))
 
     def pressed(self, q: Array, normal: Array) -> Pressing:
-        """What contacts exert at rest that press with such forces [N or N m], (contacts,), and have no friction."""
+        """Return the forces of contacts at rest without friction. normal: [N or N m], (contacts,)."""
         evaluations.follow_gaps(SINGLE, self._arrays, self._room, q[None], np.zeros((1, len(q))))
         return self._exerting(np.stack([normal, 0.0 * normal, 0.0 * normal], axis=1), 0.0 * normal)
 

@@ -42,7 +42,7 @@ Operand = tuple[str, int]
 
 
 def _is_held(node: Node) -> bool:
-    """Return whether a tree depends on what is held."""
+    """Return whether a tree depends on the held value of a sampled signal."""
     return any(isinstance(leaf, HeldValue) for leaf in leaves(node))
 
 

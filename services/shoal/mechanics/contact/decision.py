@@ -14,7 +14,7 @@ from shoal.mechanics.contact import complementarity, coulomb, impact, motion, re
 from shoal.mechanics.contact.coulomb import FINE, JAMS, KNOWN, OPEN, TROUBLES
 from shoal.mechanics.contact.impact import APART, SEPARATES, STILL, TOUCHES
 from shoal.mechanics.dynamics import ACCELERATION, Work
-from shoal.mechanics.gaps import DRY, HIT, LIFT, LOGGED, PASS, RECORD, RIGID, SLIDE, SLIP, STICK, STOP, press
+from shoal.mechanics.gaps import DRY, HIT, LIFT, LOGGED, PASS, RECORD, RIGID, SLIDE, SLIP, STICK, STOP, exceeded, press
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics.tile import Array, Flags, Tile
 from shoal.mechanics.profiles import CORNER
@@ -64,12 +64,8 @@ def decide(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float) -> None:
             if g.closed[at] == 0.0:
                 continue
             # Round-off may leave a force or a friction beyond its limit: the event follows at once.
-            force = g.force[at // width * (1 + m.gaps.tangents) * width + at % width]
-            opens = m.gaps.soft[at // width] == RIGID or g.rate[at] > 0.0
-            if m.gaps.kind[at // width] != DRY and opens and force < 0.0:
-                g.hit[at], again = LIFT, True
-            elif m.gaps.rubs[at // width] > 0 and g.mode[at] == STICK and g.margin[at] < 0.0:
-                g.hit[at], again = SLIDE, True
+            g.hit[at] = exceeded(m.gaps, g, width, at)
+            again = again or g.hit[at] != 0.0
         if not again:
             break
     for at in range(size * width):

@@ -51,7 +51,7 @@ class Sheet:
 
     @property
     def drawing(self) -> Drawing:
-        """What was drawn, the lowest layer first."""
+        """The drawing so far, the lowest layer first."""
         ordered = sorted(self._symbols, key=lambda symbol: float(LOOKS[symbol.look]["layer"]))
         return Drawing(tuple(ordered), self.carriers, self.unit)
 
